@@ -17,7 +17,6 @@ from shared import Case, Results, benches, execute, mean_of, parser_of, table  #
 
 from pyvista_vdi import generate
 from pyvista_vdi.measure.bench import accuracy
-from pyvista_vdi.model.metrics import list_edges, list_places
 from pyvista_vdi.model.options import QUALITIES, QualityTarget
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.quality.targets import turned
@@ -139,16 +138,10 @@ def of_preset(bench: Any, quality: str) -> dict[str, Any]:
     )
     view = turned(bench.view, bench.volume.bounds, _ANGLE)
     near = accuracy(bench.draw(vdi, view), bench.reference(view))
-    edges = 0.0
-    if vdi.window_size[0] < bench.size[0]:
-        places = list_places(bench.view, bench.size, vdi.window_size)
-        pictures = bench.draw(vdi, bench.view), bench.reference(bench.view)
-        edges = list_edges(*pictures, *places).ratio
     dial = vdi.metadata["dial"]
     truth = {
         "ssim": near["ssim"],
         "bytes": prepared_vdi(bench.runtime, vdi).list_bytes,
-        "list_edges": edges,
     }
     return {"predicted": dial["predicted"], "chosen": dial["chosen"], "truth": truth}
 
@@ -199,11 +192,10 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
         if found:
             truth = [row["truth"] for row in found]
             least = min(one["ssim"] for one in truth)
-            edges = max(one["list_edges"] for one in truth)
-            cells = [quality, QUALITIES[quality], len(found), f"{least:.4f}", f"{edges:.2f}"]
+            cells = [quality, QUALITIES[quality], len(found), f"{least:.4f}"]
             sizes = [row["predicted"]["bytes"] / row["truth"]["bytes"] for row in found]
             rows.append([*cells, *spread(off), f"{min(sizes):.2f} to {max(sizes):.2f}"])
-    heads = ["quality", "asked", "cases", "least SSIM", "edges along lists, at most"]
+    heads = ["quality", "asked", "cases", "least SSIM"]
     yield from table(
         (*heads, "error, mean", "without sign", "worst", "bytes, predicted / true"), rows
     )

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))  # where the reference is
 
+from reference.compositing import Segment, merge, opacity, split
 from reference.generate import vdi_of_lists
 from reference.raycast import Lists, near_limit
 from shared import Case, Latest, Results, benches, execute, milliseconds, parser_of, table
@@ -31,7 +32,6 @@ from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.measure.bench import accuracy, take_turns
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.compositing import Segment, merge, opacity, split
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 

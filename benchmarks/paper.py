@@ -24,7 +24,7 @@ from shared.volumes import KINDS
 from skimage.transform import resize
 
 from pyvista_vdi import TransferFunction, read_volume
-from pyvista_vdi.cli.declare import parse_size
+from pyvista_vdi.cli.declare import size as parse_size
 from pyvista_vdi.measure.bench import Bench, accuracy, take_turns
 from pyvista_vdi.quality.rate import FrameRate
 

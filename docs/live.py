@@ -41,7 +41,7 @@ def make_brain(size: tuple[int, int]) -> pvdi.VDI:
 
 def make_rayleigh_taylor(size: tuple[int, int]) -> pvdi.VDI:
     """Return the shipped mixing layer: both fluids are transparent, what is mixed is not."""
-    volume = examples.load_rayleigh_taylor()
+    volume = examples.load_data("rayleigh_taylor")
     x, y, z = volume.center
     camera = pvdi.Camera((x + 300, y - 380, z + 120), (x, y, z), (0, 0, 1))
     opacity = [0.0, 0.0, 0.02, 0.1, 0.3, 0.1, 0.02, 0.0, 0.0]

@@ -1,10 +1,8 @@
-"""Make the gallery's pictures: run its scripts, examples off-screen, and a small comparison.
+"""Make the gallery's pictures: run its scripts, and a small comparison.
 
     python docs/make_gallery.py [NAME ...]
 
-With names, those scripts of ``docs/gallery`` alone. The pictures of ``examples/`` are scaled down
-and reduced to 256 colours, to be committed. Look at every one of them afterwards: an example says
-at its head what one should see.
+With names, those scripts of ``docs/gallery`` alone. Look at every one of them afterwards.
 """
 
 from __future__ import annotations
@@ -20,16 +18,12 @@ from PIL import Image
 DOCS = Path(__file__).resolve().parent
 TARGET = DOCS / "images"
 
-#: Largest width of a picture, pixels, and of a file, bytes.
-WIDTH = 480
+#: Largest width of the comparison, pixels, and of its file, bytes.
 SHEET_WIDTH = 1280
 LARGEST_FILE = 100 * 1024
 
 #: Those of the scripts of docs/gallery, which are JPEG.
 LARGEST_PHOTO = 150 * 1024
-
-#: Examples whose pictures are on the site, those that hold text wide.
-SHOWN = ("occlusion", "overlap", "picking", "transfer_function")
 
 COMPARISON = ("brain", "steep", "320x180")
 
@@ -47,13 +41,6 @@ def main(names: list[str]) -> None:
                 keep_photo(folder / f"{script.stem}.png", TARGET / f"gallery-{script.stem}.jpg")
         if names:
             return
-        examples = DOCS.parent / "examples"
-        run(environment, str(examples / "interactive.py"), str(TARGET / "interactive.gif"))
-        for example in (examples / f"{stem}.py" for stem in SHOWN):
-            picture = folder / f"{example.stem}.png"
-            run(environment, str(example), str(picture))
-            width = WIDTH
-            keep(picture, TARGET / picture.name, width)
         volume, look, size = COMPARISON
         options = ("--example", volume, "--tf", look, "--size", size, "--repeats", "1")
         run(environment, "-m", "pyvista_vdi", "compare", *options, "--out", name)

@@ -1,4 +1,4 @@
-"""Make the pictures of the README and of the pages *Presets* and *Recipes*, small enough to commit.
+"""Make the pictures of README, *Presets*, *Recipes* and the tutorials, small enough to commit.
 
     python docs/make_pictures.py [NAME ...]
 
@@ -29,22 +29,25 @@ def main(names: list[str]) -> None:
     for name in pvdi.presets:
         if not names or any(f"preset-{name}".startswith(each) for each in names):
             keep(preset(name), f"preset-{name}")
+    for page in ("recipes", *(path.stem for path in TARGET.parent.glob("tutorial_*.md"))):
+        if not names or page in names:
+            of_page(page)
     if not names or "recipes" in names:
-        recipes()
+        shown = [Image.open(TARGET / f"recipe-{name}.png") for name in ("clipped", "field", "mri")]
+        keep(np.concatenate([np.asarray(each.convert("RGB")) for each in shown], axis=1), "front")
 
 
-def recipes() -> None:
-    """Run the blocks of the page *Recipes*, and keep what they write."""
-    text = (TARGET.parent / "recipes.md").read_text(encoding="utf-8")
+def of_page(name: str) -> None:
+    """Run the blocks of a page, and keep the pictures that they write."""
+    text = (TARGET.parent / f"{name}.md").read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        names: dict[str, object] = {}
         for block in re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
-            exec(block, {})
+            exec(block, names)
         for file in Path(folder).glob("*.png"):
             keep(np.asarray(Image.open(file).convert("RGB")), file.stem)
         for file in Path(folder).glob("*.gif"):
             shutil.copy(file, TARGET)
-    shown = [Image.open(TARGET / f"recipe-{name}.png") for name in ("clipped", "field", "mri")]
-    keep(np.concatenate([np.asarray(each.convert("RGB")) for each in shown], axis=1), "front")
 
 
 def preset(name: str) -> np.ndarray:

@@ -59,7 +59,7 @@ def main() -> None:
         store = Path(folder) / "waves.ome.zarr"
         write_store(store)
         camera = pvdi.Camera((330, -345, 300), (96, 96, 96), (0, 0, 1))
-        volume = pvdi.open_volume(store, camera=camera, window_size=SIZE)
+        volume = pvdi.read_volume(store).in_view(camera, window_size=SIZE)
         print(volume.describe())
         with (
             LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,

@@ -13,7 +13,6 @@ from pyvista_vdi.api import render_depth as render_depth
 from pyvista_vdi.api import render_volume as render_volume
 from pyvista_vdi.device import describe_devices as describe_devices
 from pyvista_vdi.device import list_devices as list_devices
-from pyvista_vdi.device.report import Report as Report
 from pyvista_vdi.errors import *
 from pyvista_vdi.extensions.series.generate import generate_series as generate_series
 from pyvista_vdi.extensions.series.series import VDISeries as VDISeries
@@ -21,7 +20,6 @@ from pyvista_vdi.extensions.series.writer import SeriesWriter as SeriesWriter
 from pyvista_vdi.extensions.sets.generate import generate_set as generate_set
 from pyvista_vdi.extensions.sets.vdi_set import VDISet as VDISet
 from pyvista_vdi.generation.slices import Estimate as Estimate
-from pyvista_vdi.io.stores import open_volume as open_volume
 from pyvista_vdi.io.volumes import list_volumes as list_volumes
 from pyvista_vdi.io.volumes import read_volume as read_volume
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion as AmbientOcclusion

@@ -162,9 +162,3 @@ def warn_external(message: str, category: type[Warning] = VDIWarning) -> None:
         module=frame.f_globals.get("__name__"),
         registry=frame.f_globals.setdefault("__warningregistry__", {}),
     )
-
-
-def with_article(name: str) -> str:
-    """Return the name of a type after its indefinite article."""
-    sounds_like_you = name.lower().startswith(("uni", "ui", "us"))
-    return f"{'an' if name[:1] in 'AEIOUaeiou' and not sounds_like_you else 'a'} {name}"

@@ -53,7 +53,10 @@ class ExampleVolume:
     part_of: str = ""
 
 
-#: Every volume known by name.
+#: Every volume known by name. Of the shipped ones, the brain has 181 x 217 x 181 points, 1 mm
+#: apart, x to the right, y to the front, z up; the mixing layer 192 x 192 x 192; the phantom, a
+#: cylinder of plastic with pins of known density, 412 x 412 x 19, 0.488 x 0.488 x 2.5 mm apart, in
+#: Hounsfield units from -1000 (air) to 1810, its axis along z: no patient's scan may be copied.
 VOLUMES: dict[str, ExampleVolume] = {
     "allen_mouse_brain": ExampleVolume(
         "allen_mouse_brain_20um_660x400x570_u8.nrrd",
@@ -261,65 +264,6 @@ def load_brain(*, as_volume: bool = False) -> pv.ImageData | Volume:
     (1.0, 1.0, 1.0)
     """
     return load_data("brain", as_volume=as_volume)  # type: ignore[call-overload]
-
-
-@overload
-def load_rayleigh_taylor(*, as_volume: Literal[False] = ...) -> pv.ImageData: ...
-@overload
-def load_rayleigh_taylor(*, as_volume: Literal[True]) -> Volume: ...
-def load_rayleigh_taylor(*, as_volume: bool = False) -> pv.ImageData | Volume:
-    """Load the shipped simulation of a Rayleigh-Taylor mixing layer.
-
-    192 x 192 x 192 points, uint8, spacing 1: two fluids of nearly constant concentration and the
-    turbulent layer between them.
-
-    Parameters
-    ----------
-    as_volume : bool, default: False
-        Return the engine's :class:`~pyvista_vdi.Volume`, which needs neither VTK nor PyVista.
-
-    Returns
-    -------
-    pyvista.ImageData or Volume
-        The field; its scalars are called ``"concentration"``, 0 to 255.
-
-    Examples
-    --------
-    >>> from pyvista_vdi import examples
-    >>> examples.load_rayleigh_taylor(as_volume=True).array.dtype
-    dtype('uint8')
-    """
-    return load_data("rayleigh_taylor", as_volume=as_volume)  # type: ignore[call-overload]
-
-
-@overload
-def load_ct(*, as_volume: Literal[False] = ...) -> pv.ImageData: ...
-@overload
-def load_ct(*, as_volume: Literal[True]) -> Volume: ...
-def load_ct(*, as_volume: bool = False) -> pv.ImageData | Volume:
-    """Load the shipped CT of a phantom, a cylinder of plastic with pins of known density.
-
-    412 x 412 x 19 points, int16, 0.488 x 0.488 x 2.5 mm apart; its axis is z. No patient's scan
-    may be copied here.
-
-    Parameters
-    ----------
-    as_volume : bool, default: False
-        Return the engine's :class:`~pyvista_vdi.Volume`, which needs neither VTK nor PyVista.
-
-    Returns
-    -------
-    pyvista.ImageData or Volume
-        The scan; its scalars are called ``"hounsfield"`` and are in Hounsfield units, -1000 (air)
-        to 1810.
-
-    Examples
-    --------
-    >>> from pyvista_vdi import examples
-    >>> examples.load_ct(as_volume=True).spacing
-    (0.48828125, 0.48828125, 2.5)
-    """
-    return load_data("ct", as_volume=as_volume)  # type: ignore[call-overload]
 
 
 def _locate(example: ExampleVolume) -> Path | None:

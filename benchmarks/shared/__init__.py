@@ -18,7 +18,7 @@ from typing import Any
 from tqdm import tqdm
 
 from pyvista_vdi import VDIError, Volume, examples
-from pyvista_vdi.cli.declare import parse_size
+from pyvista_vdi.cli.declare import size as parse_size
 from pyvista_vdi.cli.text import write_text
 from pyvista_vdi.measure.bench import Bench, as_json
 from pyvista_vdi.model.classification import Classification

@@ -18,7 +18,7 @@ from matplotlib.colors import LinearSegmentedColormap
 
 import pyvista_vdi as pvdi
 
-ct = pvdi.examples.load_ct()
+ct = pvdi.examples.load_data("ct")
 values = [-1000, -400, -250, -130, -60, 160, 260, 420, 1000, 1800]  # Hounsfield units
 colors = ["royalblue"] * 2 + ["deepskyblue", "turquoise"] + ["slategray"] * 2
 colors += ["orange"] * 2 + ["linen", "white"]

@@ -16,7 +16,7 @@ from PIL import Image
 
 import pyvista_vdi as pvdi
 
-ct = pvdi.examples.load_ct()
+ct = pvdi.examples.load_data("ct")
 x, y, z = ct.center
 view = pvdi.Camera(
     (x, y, z - 400), (x, y, z), (0, -1, 0), parallel_projection=True, parallel_scale=105

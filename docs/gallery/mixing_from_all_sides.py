@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 
 import pyvista_vdi as pvdi
 
-field = pvdi.examples.load_rayleigh_taylor()
+field = pvdi.examples.load_data("rayleigh_taylor")
 x, y, z = field.center
 camera = pvdi.Camera((x - 350, y - 320, z + 130), field.center, (0, 0, 1))
 vdis = pvdi.generate_set(

@@ -15,7 +15,7 @@ import pyvista as pv
 
 import pyvista_vdi as pvdi
 
-field = pvdi.examples.load_rayleigh_taylor()
+field = pvdi.examples.load_data("rayleigh_taylor")
 pl = pv.Plotter(window_size=(640, 480), lighting="none")
 pl.background_color = "black"
 pl.add_light(pv.Light(position=(500, -400, 330), focal_point=field.center, intensity=1.1))

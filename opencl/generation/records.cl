@@ -104,7 +104,7 @@ inline void store_run(__global float *records, Int k, Run run)
     store_run_at(records, places.each, run);
 }
 
-// The numbers of records: RECORDING of pyvista_vdi/generation/kernels.py.
+// The numbers of records.
 typedef struct {
     int capacity;   // runs that a record has room for
     int limit;      // that are to be left of one

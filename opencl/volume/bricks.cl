@@ -20,7 +20,7 @@ typedef struct {
     int k, end;
 } Walk;
 
-// The bricks of a volume: BRICKS of pyvista_vdi/volume/kernels.py.
+// The bricks of a volume.
 typedef struct {
     int4 counts; // along x, y, z
     int shift;   // logarithm to base 2 of a brick's cells along each edge

@@ -18,7 +18,7 @@
 #include "volume/blanking.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// The numbers of a classified volume: CLASSIFIED of pyvista_vdi/volume/kernels.py.
+// The numbers of a classified volume.
 typedef struct {
     Points points;
     int4 macrocells; // along x, y, z

@@ -2,7 +2,7 @@
 #include "lib/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// The numbers of rays: RAYS of pyvista_vdi/volume/kernels.py. Work-items are the pixels in columns
+// The numbers of rays. Work-items are the pixels in columns
 // first_column .. first_column + columns - 1 of rows first_row .. first_row + rows - 1, in blocks
 // of 4 x 4.
 typedef struct {

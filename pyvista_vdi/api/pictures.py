@@ -129,9 +129,9 @@ def render(
         from pyvista_vdi.raycasting.multi_vdi import blended
 
         return blended([(as_vdi(part), weight) for part, weight in shown.parts(view)], request)
-    from pyvista_vdi.raycasting.raycast import render_fitting
+    from pyvista_vdi.raycasting.raycast import render_vdi
 
-    return render_fitting(shown, request)
+    return render_vdi(shown, request)
 
 
 @takes(options=SceneOptions)

@@ -60,7 +60,7 @@ def generate(
         Width and height in pixels: lists along each edge of the viewport.
     client : distributed.Client or str, optional
         Of a Dask cluster, or the address of its scheduler. Its workers make the VDI of a chunked
-        volume (a :class:`Volume` of a Dask, zarr or h5py array, or of :func:`open_volume`), whose
+        volume (a :class:`Volume` of a Dask, zarr or h5py array, or of :func:`read_volume`), whose
         files all of them must find. Without it such a volume is made block by block on the local
         device. See docs/large_volumes.md.
     device : str, int or device, optional

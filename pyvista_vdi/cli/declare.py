@@ -8,124 +8,84 @@ made of the records that declare them.
 
 from __future__ import annotations
 
-import argparse
 import math
 import re
 from collections.abc import Callable
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import check_window_size
-from pyvista_vdi.model.checks import as_float, memory_limit_bytes
+from pyvista_vdi.model.checks import memory_limit_bytes
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget, declared
 from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
 
-def number(
-    what: str, low: float = -math.inf, high: float = math.inf, *, whole: bool = False
+def _numbers_as(
+    called: str, kind: type, low: float = -math.inf, high: float = math.inf
 ) -> Callable[[str], Any]:
-    """Return what reads a number between two, which neither NaN nor infinity is."""
+    """Return what reads a number between two, which is neither NaN nor infinite."""
 
-    def read(text: str) -> float:
-        try:
-            value = int(text) if whole else float(text)
-        except ValueError:
-            value = math.nan
+    def read(text: str) -> Any:
+        value = kind(text)
         if not (math.isfinite(value) and low <= value <= high):
-            raise argparse.ArgumentTypeError(f"expected {what}; got {text!r}")
+            raise ValueError
         return value
 
+    read.__name__ = called  # argparse says: invalid number value: 'x'
     return read
 
 
-NUMBER = number("a number, like 0.5")
-WHOLE = number("a whole number", whole=True)
-COUNT = number("a whole number above 0", 1, whole=True)
-PORT = number("a port's number, up to 65535", 0, 65535, whole=True)
-RATE = number("frames per second, 0 or above", 0)
-#: Of what moves: more than any screen shows is no rate.
-FPS = number("frames per second, above 0 and up to 1000", math.ulp(0.0), 1000)
+NUMBER = _numbers_as("number", float)
 
 
 def numbers(text: str) -> tuple[float, ...]:
     """Return numbers from ``0,5,30``."""
-    found = tuple(map(as_float, text.split(",")))
-    if not all(map(math.isfinite, found)):
-        raise argparse.ArgumentTypeError(
-            f"expected numbers with commas between them, like 0,5,30; got {text!r}"
-        )
-    return found
+    return tuple(map(NUMBER, text.split(",")))
 
 
-def parse_size(text: str) -> tuple[int, int]:
+def size(text: str) -> tuple[int, int]:
     """Return width and height, pixels, from ``1280x720``."""
-    match = re.fullmatch(r"(\d+)[xX](\d+)", text)
-    if not match:
-        raise argparse.ArgumentTypeError(f"a size is WIDTHxHEIGHT, like 1280x720; got {text!r}")
-    try:
-        return check_window_size((int(match[1]), int(match[2])), name="the size")
-    except InvalidArgumentError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+    width, height = map(int, text.lower().split("x"))
+    return check_window_size((width, height))
 
 
-def _bytes(text: str) -> int | None:
-    try:
-        return memory_limit_bytes(text)
-    except InvalidArgumentError:
-        message = f"expected a size such as 2GiB or 800MB; got {text!r}"
-        raise argparse.ArgumentTypeError(message) from None
+def size_in_bytes(text: str) -> int | None:
+    """Return bytes from ``2GiB``."""
+    return memory_limit_bytes(text)
 
 
-def _level(text: str) -> int | str:
-    if text != "auto" and not text.isdecimal():
-        raise argparse.ArgumentTypeError(
-            f"expected auto, or a level's number from 0, the finest; got {text!r}"
-        )
-    return text if text == "auto" else int(text)
+def level(text: str) -> int | str:
+    """Return ``auto``, or a level's number."""
+    return text if text == "auto" else int(_numbers_as("level", int, 0)(text))
 
 
-def _number_or_name(text: str) -> int | str:
-    return int(text) if text.isdecimal() else text
-
-
-def _opacity(text: str) -> str | list[float]:
-    return list(numbers(text)) if re.match(r"[-+.\d]", text) else text
+def opacity(text: str) -> str | tuple[float, ...]:
+    """Return a name, or numbers from ``0,0.5,1``."""
+    return numbers(text) if re.match(r"[-+.\d]", text) else text
 
 
 def color(text: str) -> tuple[float, ...]:
-    """Return RGB, each from 0 to 1, from a name or numbers."""
-    if re.match(r"[-+.\d]", text):
-        found = numbers(text)
-        if len(found) != 3 or not all(0 <= c <= 1 for c in found):
-            raise argparse.ArgumentTypeError(f"expected R,G,B from 0 to 1; got {text!r}")
-        return found
+    """Return RGB, each from 0 to 1, from a name or ``#rrggbb``."""
     from PIL import ImageColor
 
-    try:
-        return tuple(c / 255 for c in ImageColor.getrgb(text)[:3])
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is no colour: give a name, #rrggbb or R,G,B from 0 to 1"
-        ) from error
+    return tuple(c / 255 for c in ImageColor.getrgb(text)[:3])
 
 
 #: What reads a value, by what it is called: a text, where that is not here.
 _READERS: dict[str, Callable[[str], Any]] = {
     **dict.fromkeys(("X", "X Y Z", "LOW HIGH", "DEGREES", "LENGTH", "S", "T"), NUMBER),
-    "N": WHOLE,
-    "COUNT": COUNT,
-    "RATE": RATE,
-    "FPS": FPS,
-    "PORT": PORT,
-    "WxH": parse_size,
-    "SIZE": _bytes,
+    "N": _numbers_as("whole number", int),
+    "COUNT": _numbers_as("count", int, 1),
+    "RATE": _numbers_as("rate", float, 0),
+    "PORT": _numbers_as("port", int, 0, 65535),
+    "WxH": size,
+    "SIZE": size_in_bytes,
     "A,B,...": numbers,
     "COLOR": color,
-    "auto|N": _level,
-    "N|NAME": _number_or_name,
-    "NAME|A,B,...": _opacity,
+    "auto|N": level,
+    "N|NAME": lambda text: int(text) if text.isdecimal() else text,
+    "NAME|A,B,...": opacity,
 }
 #: What values are called, by the types of options in the records; of others ``NAME``.
 _CALLED = {
@@ -167,7 +127,7 @@ max_bytes           SIZE      most bytes of the VDI on the device, like 20MB
 compression         {lz4,zstd,deflate,none}  of .vdi, by default lz4; .html has deflate
 compression_level   N         1 (fast) to 9 (small)
 time                T         of a series, the step nearest in time (default: the first)
-background          COLOR     a name, #rrggbb or R,G,B from 0 to 1
+background          COLOR     a name or #rrggbb
 scheduler           ADDRESS   of stores: that of Dask, whose workers make the VDIs
 device              NAME      OpenCL device, see pyvista-vdi devices
 json                -         print JSON
@@ -183,10 +143,10 @@ _GROUPS = {
     "look": """[classification] Names, defaults and meaning are those of PyVista's add_volume.
         tf cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale shade
         scalars preference interpolation ambient diffuse specular specular_power""",
-    "values": """[classification] Of VDIs that keep values.
+    "values": """[classification] Of VDIs that store scalars.
         tf cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale
         transfer_function""",
-    "deferral": """[classified afterwards] Values are kept; convert, render and view take the look.
+    "deferral": """[classified afterwards] Scalars are stored; render, view, convert take looks.
         classification value_range importance""",
     "occlusion": """[ambient occlusion] Either option below turns it on, too.
         ambient_occlusion occlusion_radius occlusion_strength""",
@@ -195,10 +155,10 @@ _GROUPS["table"] = f"{_GROUPS['look']} transfer_function"
 
 _VDI = "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, or a page, .html"
 _VOLUME = (
-    "a file (.nii.gz, .nrrd, .mha, .tif, .mrc, .h5, .vti, .npy, ...), a folder of slices (DICOM, "
+    "a file (.nii.gz, .nrrd, .mha, .tif, .h5, .vti, .npy, ...), a folder of slices (DICOM, "
     "TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
 )
-_STEPS = "; several are time steps, step_2 before step_10, and so are those of a store or a .pvd"
+_STEPS = "; several are time steps, step_2 before step_10, and so are those of a store"
 #: What is read, by names for it: of which some may be a volume that is known by its name.
 _FILES = {
     "VDI": _VDI,
@@ -243,25 +203,19 @@ def _add_files(parser: Any, what: str) -> None:
     several, called = "S" in what, "VOLUME" if what.startswith("VOLUME") else "FILE"
     how: dict[str, Any] = {"help": _FILES[what], "metavar": called}
     if "VOLUME" not in what or what == "VDIS|VOLUMES":
-        parser.add_argument(
-            *(["files"] if several else ["file"]), **how, nargs="+" * several or None
-        )
+        parser.add_argument("files" if several else "file", nargs="+" * several or None, **how)
         return
     into = parser.add_mutually_exclusive_group(required=True)
-    if several:
-        into.add_argument("files", nargs="*", default=[], **how)
-    else:
-        into.add_argument("file", nargs="?", **how)
-    text = (
-        "a volume known by name: brain, ct and rayleigh_taylor are shipped, others are read from "
-    )
-    text += "the folder that PYVISTA_VDI_DATA names"
+    name, default = ("files", ()) if several else ("file", None)
+    into.add_argument(name, nargs="*" if several else "?", default=default, **how)
+    text = "a volume known by name: brain, ct and rayleigh_taylor are shipped, others are read from"
+    text += " the folder that PYVISTA_VDI_DATA names"
     into.add_argument("--example", help=text, metavar="NAME")
     add(parser, "spacing origin level channel series time_index")
 
 
 def _add_option(into: Any, name: str, value: str, text: str) -> None:
-    """Add an option; a value in brackets need not be given, one with ``+`` may be repeated."""
+    """Add an option; one whose value has a ``+`` may be repeated."""
     name, _, default = name.partition("=")
     how: dict[str, Any] = {"help": f"{text} (default: {default})" if default else text}
     names, read = value.split(), _READERS.get(value, str)
@@ -269,8 +223,6 @@ def _add_option(into: Any, name: str, value: str, text: str) -> None:
         how |= {"action": "store_true", "default": None}
     elif value.startswith("{"):
         how |= {"choices": value[1:-1].split(","), "default": default or None}
-    elif value.startswith("["):
-        how |= {"nargs": "?", "const": default, "metavar": value[1:-1]}
     elif value.endswith((" ...", " +")):
         how |= {"metavar": names[0]}
         how |= {"nargs": "+"} if names[1] == "..." else {"action": "append"}
@@ -280,8 +232,8 @@ def _add_option(into: Any, name: str, value: str, text: str) -> None:
         how |= {"default": read(default)} if default else {}
     if name == "output":
         how["required"] = True
-    flags = [f"--{each.replace('_', '-')}" for each in name.split("|")]
-    into.add_argument(*(["-o"] if name == "output" else []), *flags, **how)
+    short = ["-o"] if name == "output" else []
+    into.add_argument(*short, f"--{name.replace('_', '-')}", **how)
 
 
 def _known() -> dict[str, tuple[str, str, str]]:

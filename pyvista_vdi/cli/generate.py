@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from pathlib import Path
 
 from pyvista_vdi.api import generate as generate_vdi
 from pyvista_vdi.cli.inputs import (
@@ -15,11 +16,9 @@ from pyvista_vdi.cli.inputs import (
     given,
     measuring,
     read_volume,
-    refuse_with_values,
-    say_vdi,
 )
+from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
-from pyvista_vdi.generation.slices import estimate
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.camera import Camera
@@ -34,31 +33,15 @@ def generate(options: argparse.Namespace) -> int:
     """Generate a VDI and write it."""
     # Refuse what cannot be before the volume is read
     path, file_arguments = checked_target(options.output), file_options(options)
-    target, look = (
-        QualityTarget(**given(options, QualityTarget, flat=True)),
-        classification(options),
-    )
-    looks = Classification.composited(look, "generate")
-    refuse_with_values(options)
+    QualityTarget(**given(options, QualityTarget, flat=True))
+    look = classification(options)
+    Classification.composited(look, "generate")
     how = given(options, GenerationOptions, QualityTarget, Deferral)
     volume = read_volume(options, in_chunks=True)
     view = generating_view(options, volume)
     volume = as_seen(options, volume, view)
-    # Say what is going to be made, and how much memory that may take
     if isinstance(volume, StoredVolume):
         print(volume.describe(), file=sys.stderr)
-    (nx, ny, nz), (width, height) = volume.dimensions, options.size
-    needed = f"{width} x {height} lists: block by block"
-    if target and not volume.chunked:
-        needed = f"pictures of {width} x {height}: settings are chosen by a measurement"
-    elif not volume.chunked:
-        deferred = options.classification == "deferred"
-        table = None if deferred else looks.transfer_function_of(volume)
-        flat = given(options, GenerationOptions, flat=True)
-        flat |= {"transfer_function": table, "device": options.device}
-        most = estimate(volume, options.size, **flat).total / 2**20
-        needed = f"{width} x {height} lists: up to {most:.0f} MiB"
-    print(f"{nx} x {ny} x {nz} points, {needed}", file=sys.stderr)
     start = time.perf_counter()
     how |= {"client": options.scheduler, "device": options.device, **look}
     with measuring("generating a VDI") as bar:
@@ -73,13 +56,19 @@ def generate(options: argparse.Namespace) -> int:
     return 0
 
 
+def say_vdi(options: argparse.Namespace, vdi: object, more: str = "") -> None:
+    """Print what was written to ``--output``."""
+    n_bytes = mebibytes(Path(options.output).stat().st_size)
+    print(f"{printable(options.output)}: {vdi}, {n_bytes}{more}")
+
+
 def as_seen(options: argparse.Namespace, volume: Volume, view: Camera) -> Volume:
     """Return a volume at the level that a view requires, where it is of a store with several."""
     if options.scheduler is not None and not volume.chunked:
         raise UnsupportedError("--scheduler is for stores of chunks, such as x.ome.zarr")
     if not isinstance(volume, StoredVolume):
         return volume
-    return volume.at_level("auto" if options.level is None else options.level, view, options.size)
+    return volume.in_view(view, window_size=options.size)
 
 
 def generating_view(options: argparse.Namespace, volume: Volume) -> Camera:
@@ -88,9 +77,8 @@ def generating_view(options: argparse.Namespace, volume: Volume) -> Camera:
         return camera(options, filling_camera(volume.bounds, options.size))
     if not abs(ELEVATION + options.elevation) < 90:
         raise InvalidArgumentError(
-            f"--elevation must lie between {-90 - ELEVATION:g} and {90 - ELEVATION:g} degrees, "
-            f"both excluded, for a view that is {ELEVATION:g} degrees above the volume's middle "
-            f"without it; got {options.elevation:g}: choose another, or give a --position"
+            f"--elevation lifts a view that is {ELEVATION:g} degrees above the volume's middle, "
+            f"and must leave it below 90; got {options.elevation:g}"
         )
     return filling_camera(
         volume.bounds,

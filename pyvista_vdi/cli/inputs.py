@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import argparse
 import json
-import logging
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from threading import Event, Thread
 from typing import Any, TypeVar
 
-from pyvista_vdi import registry
-from pyvista_vdi.cli.text import mebibytes, plain_number, printable
+from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
 from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file, stores, volumes
 from pyvista_vdi.io.files import format_named, holds
-from pyvista_vdi.io.stores import StoredVolume, is_store
+from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.volumes.in_file import placed
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.arguments import Settings
@@ -25,27 +22,22 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
 from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import QualityTarget, declared
+from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.plotting.imports import import_pyvista
 from pyvista_vdi.plotting.progress import DelayedBar
 
 _T = TypeVar("_T")
 
-#: Seconds between two looks of a bar at the clock.
-_PULSE = 0.5
-#: Options that say what is taken of a file or a store that holds several volumes.
-OF_SEVERAL = ("level", "channel", "time_index", "series")
 #: Options that say how a volume's file is read.
-OF_VOLUMES = ("scalars", "preference", "spacing", "origin", *OF_SEVERAL)
+OF_VOLUMES = (
+    *("scalars", "preference", "spacing", "origin", "level", "channel", "time_index", "series"),
+)
 #: Options that give colours and opacities.
 LOOK = ("tf", "transfer_function", *declared(Look))
 #: Options that say where the eye is, instead of turning the default view.
 PLACE = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")
-_SHADING = ("shade", "ambient", "diffuse", "specular", "specular_power")
-_OCCLUSION = ("ambient_occlusion", "occlusion_radius", "occlusion_strength")
 
 
 def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dict[str, Any]:
@@ -73,30 +65,13 @@ def classification(options: argparse.Namespace) -> dict[str, Any]:
     return found
 
 
-def refuse_with_values(options: argparse.Namespace) -> None:
-    """Refuse, before a volume is read, what does not go with when scalars are classified."""
-    if options.classification != "deferred":
-        refuse(options, ("value_range", "importance"), "--classification deferred")
-        return
-    why = "--classification deferred keeps values, which have no colours yet: "
-    found = format_named(options.output)
-    if found is not None and not found.values and found.holds == "VDI":
-        raise InvalidArgumentError(f"{why}write a .vdi file in place of {found.suffix}")
-    names = (*_SHADING, *_OCCLUSION, *declared(QualityTarget))
-    refuse(options, names, "VDIs that have colours", why)
-    looks = [name for name in LOOK if name != "interpolation"]
-    refuse(options, looks, "'pyvista-vdi render', view or convert of what is written", why)
-
-
-def refuse(options: argparse.Namespace, names: Iterable[str], what: str, why: str = "") -> None:
+def refuse(options: argparse.Namespace, names: Iterable[str], what: str) -> None:
     """Refuse options that were given and would mean nothing: they are for something else."""
     for name in names:
         value = getattr(options, name, None)
         if value is not None and value is not False:
-            values = value if isinstance(value, list | tuple) else [value] * (value is not True)
-            shown = [v if isinstance(v, str) else plain_number(v) for v in values]
-            option = " ".join([f"--{name.replace('_', '-')}", *shown])
-            raise UnsupportedError(f"{why}{option} is for {what}: leave it out")
+            given = f"--{name.replace('_', '-')}={value}".removesuffix("=True")
+            raise UnsupportedError(f"{given} is for {what}: leave it out")
 
 
 def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volume:
@@ -105,16 +80,16 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
     A store is read whole, unless ``in_chunks``.
     """
     if options.example is not None:
-        refuse(options, OF_SEVERAL, "files that hold several volumes, and this is none")
+        refuse(options, OF_VOLUMES[4:], "files that hold several volumes, and this is none")
         from pyvista_vdi import examples
 
-        return laid_out(examples.load_data(options.example, as_volume=True), options)
+        return _laid_out(examples.load_data(options.example, as_volume=True), options)
     if is_store(options.file):
         volume: Any = open_store(options)
         if len(volume.store.levels) > 1 and options.level in (None, "auto"):
             # Of another level they are others
             refuse(options, ("spacing", "origin"), "one level of a store, which --level chooses")
-        volume = laid_out(volume, options)
+        volume = _laid_out(volume, options)
     else:
         array = options.scalars
         if array is not None and options.preference == "cell":
@@ -131,25 +106,12 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
     return volume  # type: ignore[no-any-return]
 
 
-def laid_out(volume: Any, options: argparse.Namespace) -> Volume:
-    """Return a volume with the scalars, the spacing and the origin asked for."""
+def _laid_out(volume: Any, options: argparse.Namespace) -> Volume:
     taken = as_volume(volume, options.scalars, options.preference or "point")
     return placed(taken, options.spacing, options.origin)
 
 
-@contextmanager
-def quietly() -> Iterator[None]:
-    """Silence VTK's readers: the error says what is wrong."""
-    before = logging.root.manager.disable
-    logging.disable(logging.ERROR)
-    try:
-        with import_pyvista().vtk_verbosity("off"):
-            yield
-    finally:
-        logging.disable(before)
-
-
-def open_store(options: argparse.Namespace) -> StoredVolume:
+def open_store(options: argparse.Namespace) -> Any:
     """Open the store that is named, with what is asked of it."""
     asked = {"level": options.level, "channel": options.channel, "time": options.time_index}
     chosen: Any = {name: value for name, value in asked.items() if value is not None}
@@ -162,19 +124,19 @@ def is_volume(options: argparse.Namespace) -> bool:
         return True
     if not is_vdi_file(options.file) and holds(options.file) in (None, "VDI"):
         return True
-    refuse(options, OF_VOLUMES, "volumes", f"{printable(options.file)} is a VDI: ")
+    refuse(options, OF_VOLUMES, f"volumes, and {printable(options.file)} is a VDI")
     return False
 
 
-def require_vdi(file: str, verb: str) -> None:
+def require_vdi(file: str, name: str) -> None:
     """Refuse a volume where a VDI is wanted, and say how the command makes one."""
-    named = printable(file)
+    shown = printable(file)
     if not (is_vdi_file(file) or is_store(file) or os.path.exists(file)):  # noqa: PTH110 - too long
-        raise VDIFileError(f"{named} does not exist: check the file's name")
+        raise VDIFileError(f"{shown} does not exist: check the file's name")
     if not is_vdi_file(file) and holds(file) not in ("series", "set"):
         raise UnsupportedError(
-            f"{named} is no VDI, which is what {verb} takes; of a volume, 'pyvista-vdi generate "
-            f"{named} -o FILE.vdi' makes one"
+            f"{shown} is no VDI, which is what {name} takes; of a volume, 'pyvista-vdi generate "
+            f"{shown} -o FILE.vdi' makes one"
         )
 
 
@@ -210,18 +172,11 @@ def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterato
 
 @contextmanager
 def measuring(label: str) -> Iterator[DelayedBar]:
-    """Show a bar that is alive."""
-    bar, finished = DelayedBar(label=label), Event()
-
-    def pulse() -> None:
-        while not finished.wait(_PULSE):
-            bar.pulse()
-
-    Thread(target=pulse, daemon=True).start()
+    """Show how far the work is."""
+    bar = DelayedBar(label=label)
     try:
         yield bar
     finally:
-        finished.set()
         bar.close()
 
 
@@ -231,7 +186,7 @@ def part(bar: DelayedBar, first: float, last: float, doing: str) -> Callable[[fl
     return lambda fraction: bar(first + fraction * (last - first), doing)
 
 
-def say_written(files: Iterable[Path]) -> None:
+def say_written(files: Iterable[Path | str]) -> None:
     """Name the files that were written."""
     print("Written: " + ", ".join(printable(path) for path in files))
 
@@ -255,50 +210,32 @@ def camera(options: argparse.Namespace, default: Camera) -> Camera:
 def file_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of ``save`` that the options stand for; refused now, not later."""
     names = {"compression": "compression", "compression_level": "level", "precision": "precision"}
-    written = format_named(options.output)
-    for name, argument in names.items():
-        of = [each.suffix for each in registry.formats() if argument in each.write_options]
-        if of and written and written.holds == "VDI" and argument not in written.write_options:
-            refuse(options, (name,), f"{' and '.join(of)}, not {printable(options.output)}")
     found = {argument: getattr(options, name, None) for name, argument in names.items()}
     found = {argument: value for argument, value in found.items() if value is not None}
+    written = format_named(options.output)
     if written and written.holds == "VDI":
         check_write_options(options.output, found)
     return found
 
 
-def keeps_values(found: Any) -> bool:
-    """Whether what was read keeps values, so that a look can be given."""
-    return getattr(found, "value_range", None) is not None
-
-
 def look_for(
     options: argparse.Namespace, found: Any, file: str, *, colors: bool = True
 ) -> dict[str, Any]:
-    """Return the look that the options give what was read, where it keeps values.
+    """Return the look that the options give what was read, where it stores scalars.
 
     Where it does not, a look is refused, and where ``colors`` are needed the lack of one.
     """
     named = printable(file)
-    if not keeps_values(found):
-        refuse(options, LOOK, "VDIs that keep values", f"{named} has its look, and ")
+    if getattr(found, "value_range", None) is None:
+        refuse(options, LOOK, f"VDIs that store scalars, and {named} has its look")
         return {}
     look = classification(options)
     if colors and not look:
         raise UnsupportedError(
-            f"{named} keeps values, which have no colours yet: give --cmap, --opacity, --tf or "
+            f"{named} stores scalars, which have no colours yet: give --cmap, --opacity, --tf or "
             "--transfer-function"
         )
     return look
-
-
-def say_vdi(options: argparse.Namespace, vdi: Any, more: str = "") -> None:
-    """Print what was written to ``--output``."""
-    width, height = vdi.window_size
-    print(
-        f"{printable(options.output)}: {vdi.n_supersegments} supersegments in {width} x {height} "
-        f"lists, {mebibytes(Path(options.output).stat().st_size)}{more}"
-    )
 
 
 def from_json(path: str, build: Callable[[dict[str, Any]], _T], kind: str) -> _T:

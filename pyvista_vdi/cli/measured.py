@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Mapping
 from dataclasses import asdict
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,7 +27,6 @@ from pyvista_vdi.measure.tradeoff import AXES, COSTS, DEFAULT_AXES, measure_trad
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.vtk_pipeline.vtk import BACKEND
 
 #: Frames and views of ``tradeoff``, without and with ``--quick``.
 _SIZES = ((640, 360), (320, 180))
@@ -57,7 +53,7 @@ def compare(options: argparse.Namespace) -> int:
     write_png(contact_sheet(report, images), files["png"])
     write_text(files["json"], json.dumps(as_json(report), indent=1) + "\n")
     print(table(report))
-    say_written(Path(options.out) / path.name for path in files.values())
+    say_written(files.values())
     return 0
 
 
@@ -70,30 +66,23 @@ def tradeoff(options: argparse.Namespace) -> int:
     usual = {n: values[-1:] if quick else values for n, values in AXES.items()}
     axes = dict(_axis(text, usual) for text in options.sweep or DEFAULT_AXES)
     settings = sweep(axes)
-    name = options.name or volume_name(options)
-    if Path(name).name != name:
-        raise InvalidArgumentError(f"--name becomes a file's, without a folder; got {name!r}")
-    volume = read_volume(options)
+    name, volume = volume_name(options), read_volume(options)
     if not set(look) - {"interpolation"} and not volume.rgba:
         # A ramp from transparent black to opaque white, which needs no PyVista
         ramp = np.linspace(0.0, 1.0, 256)
         function = TransferFunction(np.stack([ramp] * 3, axis=1), ramp, volume.finite_range())
         interpolation = look.get("interpolation", "nearest")
         look = {"transfer_function": function.replace(interpolation=interpolation)}
-    vtk = not options.no_vtk
-    if vtk and find_spec(BACKEND) is None:
-        print("VTK is not installed: its mappers are left out", file=sys.stderr)
-        vtk = False
     how = {n: getattr(options, n) for n in ("repeats", "generations", "device")}
     how |= {
         "window_size": options.size or _SIZES[quick],
         "angles": options.angles or _ANGLES[quick],
+        "vtk": not options.no_vtk,
+        "name": name,
     }
-    with (
-        output_files(options, f"tradeoff-{name}", "json", "md") as files,
-        measuring("tradeoff") as bar,
-    ):
-        found = measure_tradeoff(volume, settings, vtk=vtk, name=name, progress=bar, **how, **look)
+    kinds = ("json", "md")
+    with output_files(options, f"tradeoff-{name}", *kinds) as files, measuring("tradeoff") as bar:
+        found = measure_tradeoff(volume, settings, progress=bar, **how, **look)
     for kind in COSTS:
         print(f"{kind} against SSIM: {'; '.join(found.front(kind))}")
     for worse, better in found.dominated().items():
@@ -113,13 +102,10 @@ def _axis(text: str, usual: Mapping[str, tuple[Any, ...]]) -> tuple[str, tuple[A
         raise InvalidArgumentError(f"--sweep knows no {given!r}: known are {known}")
     if not equals:
         return name, usual[name]
-    kind, chosen = type(AXES[name][0]), []
-    for value in values.split(","):
-        try:
-            chosen.append({"on": True, "off": False}[value] if kind is bool else kind(value))
-        except (KeyError, ValueError) as error:
-            expected = {bool: "on or off", int: "a whole number", float: "a number"}[kind]
-            raise InvalidArgumentError(
-                f"--sweep {name.replace('_', '-')} takes {expected}; got {value!r}"
-            ) from error
-    return name, tuple(chosen)
+    kind = type(AXES[name][0])
+    read: Any = {"on": True, "off": False}.__getitem__ if kind is bool else kind
+    try:
+        return name, tuple(map(read, values.split(",")))
+    except (KeyError, ValueError) as error:
+        expected = {bool: "on or off", int: "whole numbers", float: "numbers"}[kind]
+        raise InvalidArgumentError(f"--sweep {given} takes {expected}; got {values!r}") from error

@@ -13,35 +13,6 @@ from pyvista_vdi._version import __version__
 from pyvista_vdi.cli.declare import add
 from pyvista_vdi.cli.verbs import VERBS
 
-_DESCRIPTION = "Volumetric Depth Images: generate, render, view and compare them."
-
-#: What the command says without a subcommand.
-_LESSON = f"""{_DESCRIPTION} Version {__version__}.
-
-A first session, with a volume that is shipped:
-
-  pyvista-vdi generate --example brain --tf soft -o brain.vdi     make a VDI
-  pyvista-vdi view brain.vdi                                      turn it in a window
-  pyvista-vdi render brain.vdi -o brain.png --azimuth 20          or a picture from elsewhere
-  pyvista-vdi convert brain.vdi -o brain.html                     or a page that turns it
-  pyvista-vdi turntable --example brain --tf soft -o brain.gif    or a moving picture
-
-With your own, a file or a folder of DICOM slices:
-
-  pyvista-vdi generate scans/head -o head.vdi --cmap ct-bone
-
-pyvista-vdi --help lists all subcommands, pyvista-vdi generate --help explains one, and
-pyvista-vdi devices says on what it runs.
-"""
-
-#: So many names are listed where none of them is meant; more are left to ``--help``.
-_LISTED = 16
-
-#: Subcommands that went, and what does their work.
-_GONE = {
-    "benchmark": "the paper's tables are measured by a script of a checkout, benchmarks/paper.py"
-}
-
 
 class UsageError(Exception):
     """A mistake in the arguments; the message says which and what is right."""
@@ -63,54 +34,43 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
 
     Raises UsageError, which suggests what may have been meant.
     """
-    added = registry.verbs()
-    both: dict[str, Any] = {**VERBS, **added}
-    known = {name: (verb.summary, verb.example) for name, verb in both.items()}
-    name, *rest = arguments or [""]
-    if not name:
-        print(_LESSON, end="")
-    elif name in ("-h", "--help"):
-        listed = "\n".join(f"    {name:<11}{summary}" for name, (summary, _) in known.items())
-        print(f"usage: pyvista-vdi [--version] SUBCOMMAND ...\n\n{_DESCRIPTION}\n\n{listed}\n")
-        print("Each explains itself: pyvista-vdi generate --help")
-    elif name == "--version":
+    known = {verb.name: verb for verb in VERBS} | registry.verbs()
+    name, *rest = arguments or ["--help"]
+    if name in ("-h", "--help"):
+        listed = "\n".join(f"    {verb.name:<11}{verb.summary}" for verb in known.values())
+        print("usage: pyvista-vdi [--version] SUBCOMMAND ...\n")
+        print(f"Volumetric Depth Images: generate, render, view and compare them.\n\n{listed}\n")
+        print("Each explains itself: pyvista-vdi generate --help. A first session:\n")
+        print("    pyvista-vdi generate --example brain --tf soft -o brain.vdi")
+        print("    pyvista-vdi view brain.vdi")
+        return None
+    if name == "--version":
         print(f"pyvista-vdi {__version__}")
-    elif name not in known:
-        hint = _GONE.get(name) or _suggestion(name, list(known))
-        raise UsageError(f"there is no subcommand {name!r}: {hint}")
-    else:
-        summary, example = known[name]
-        parser = _Parser(
-            prog=f"pyvista-vdi {name}",
-            description=f"{summary[0].upper()}{summary[1:]}.",
-            epilog=f"Example:\n  {example}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-            allow_abbrev=False,
-        )
-        own = VERBS.get(name)
-        add(parser, registry.load(added[name].options) if own is None else own.options)
-        place = added[name].run if own is None else f"{__package__}.{own.module}:{name}"
-        parser.set_defaults(run=_run, place=place)
-        return _parsed(parser, rest)
-    return None
-
-
-def _parsed(parser: _Parser, arguments: list[str]) -> argparse.Namespace | None:
-    """Parse the arguments of a subcommand; name one that is not known before its value."""
-    options = [name for name in parser._option_string_actions if name.startswith("--")]
-    names = (text.split("=")[0] for text in arguments[: [*arguments, "--"].index("--")])
+        return None
+    if name not in known:
+        raise UsageError(f"there is no subcommand {name!r}: {_suggestion(name, [*known])}")
+    verb = known[name]
+    parser = _Parser(
+        prog=f"pyvista-vdi {name}",
+        description=f"{verb.summary[0].upper()}{verb.summary[1:]}.",
+        epilog=f"Example:\n  {verb.example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add(parser, registry.load(verb.options))
+    parser.set_defaults(run=_run, place=verb.run)
+    # Name an option that is not known before its value
+    options = [each for each in parser._option_string_actions if each.startswith("--")]
+    names = (text.split("=")[0] for text in rest[: [*rest, "--"].index("--")])
     wrong = [text for text in names if text.startswith("--") and text not in options]
     try:
-        found, unknown = (None, wrong) if wrong else parser.parse_known_args(arguments)
+        found, unknown = (None, wrong) if wrong else parser.parse_known_args(rest)
     except SystemExit:  # after --help
         return None
     if unknown:
-        # With the value that was given with it
-        argument = next(text for text in arguments if text.startswith(unknown[0]))
-        hint = f"; see {parser.prog} --help"
-        if argument.startswith("-"):
-            hint = f": {_suggestion(argument.split('=')[0], options)}"
-        raise UsageError(f"{parser.prog.split()[-1]} takes no argument {argument!r}{hint}")
+        argument = next(text for text in rest if text.startswith(unknown[0]))  # with its value
+        hint = _suggestion(argument.split("=")[0], options)
+        raise UsageError(f"{name} takes no argument {argument!r}: {hint}")
     return found
 
 
@@ -126,7 +86,4 @@ def _run(options: argparse.Namespace) -> int:
 
 def _suggestion(name: str, known: Sequence[str]) -> str:
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    if near:
-        return f"did you mean {near[0]!r}?"
-    names = list(dict.fromkeys(known))
-    return f"known are {', '.join(names)}" if len(names) <= _LISTED else "see --help"
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"

@@ -1,9 +1,8 @@
-"""Text for a terminal."""
+"""Text for a terminal, and into files."""
 
 from __future__ import annotations
 
 import os
-from typing import Any
 
 from pyvista_vdi.model.whole_file import whole_file
 
@@ -22,22 +21,6 @@ def printable(text: object) -> str:
 def mebibytes(n: int) -> str:
     """Return bytes in MiB."""
     return f"{n / 2**20:.1f} MiB"
-
-
-def table(rows: dict[str, Any]) -> str:
-    """Return names and what they stand for in two columns."""
-    column = max(map(len, rows))
-    return "\n".join(printable(f"{name:<{column}}  {value}") for name, value in rows.items())
-
-
-def vector(values: Any) -> str:
-    """Return numbers in brackets."""
-    return f"({', '.join(map(plain_number, values))})"
-
-
-def plain_number(value: float) -> str:
-    """Return a number as people write it."""
-    return f"{value + 0.0:g}"  # no zero has a sign
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

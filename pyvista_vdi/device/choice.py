@@ -22,7 +22,7 @@ PROBE_COUNT, PROBE_GROUP = 256, 32
 PROBE_RTOL = 4 * 2.0**-23
 
 _lock = threading.RLock()
-_probed: dict[tuple[int, int], tuple[DeviceInfo, Runtime | None]] = {}
+_probed: dict[str, tuple[DeviceInfo, Runtime | None]] = {}
 _default: Runtime | None = None
 
 
@@ -39,21 +39,22 @@ def list_devices() -> list[DeviceInfo]:
     MissingDependencyError
         If pyopencl cannot be imported.
     """
-    return [_probe(info)[0] for info in devices.find_devices()[0]]
+    return [_probe(info)[0] for info in devices.find_devices()]
 
 
 def get_runtime(device: Any = None) -> Runtime:
     """Return the runtime of a device, made once per process: the same object for the same device.
 
     ``device`` is a part of ``"platform / device"``, letter case ignored,
-    ``"platform_index:device_index"``, a DeviceInfo, a Runtime, or pyopencl's Device. By default it
-    is what the environment variable ``PYVISTA_VDI_DEVICE`` says, and without it the best device
-    that passes the probe: GPU, then CPU (Intel's runtime before PoCL).
+    ``"platform_index:device_index"``, a DeviceInfo or a Runtime. By default it is what the
+    environment variable ``PYVISTA_VDI_DEVICE`` says, and without it the best device that passes the
+    probe: GPU, then CPU (Intel's runtime before PoCL).
 
     Raises NoDeviceError if there is no usable device, or the one asked for is absent, ambiguous or
     not usable; InvalidArgumentError for another type; MissingDependencyError without pyopencl;
     DeviceError in a fork of a process that had used or listed devices.
     """
+    global _default
     devices.require_drivers()
     if isinstance(device, Runtime):
         return device
@@ -64,12 +65,25 @@ def get_runtime(device: Any = None) -> Runtime:
     if device is None and _default is not None:
         return _default
     with _lock:
-        return _best() if device is None else _named(device, origin)
-
-
-def default_device(infos: list[DeviceInfo]) -> DeviceInfo | None:
-    """Return the device that is used when none is named, among probed ones, if one is usable."""
-    return min((info for info in infos if info.usable), key=devices.preference, default=None)
+        infos = devices.find_devices()
+        if device is None:
+            # The first that passes the probe, which is remembered: the drivers' list is fixed
+            for info in sorted(infos, key=devices.preference):
+                _default = _probe(info)[1]
+                if _default is not None:
+                    return _default
+            raise NoDeviceError(devices.no_device_message(list_devices()))
+        if isinstance(device, DeviceInfo):
+            device = device.selector
+        if not isinstance(device, str):
+            raise InvalidArgumentError(
+                f"device={device!r} of type {type(device).__name__}: give a name, a DeviceInfo or "
+                "a Runtime"
+            )
+        info, runtime = _probe(devices.select(infos, device, origin))
+        if runtime is None:
+            raise NoDeviceError(_unusable(info, f"{origin}{device!r}"))
+        return runtime
 
 
 def describe_devices() -> str:
@@ -85,74 +99,35 @@ def describe_devices() -> str:
     MissingDependencyError
         If pyopencl cannot be imported.
     """
-    infos, (_, notes) = list_devices(), devices.find_devices()
-    best, variable = default_device(infos), devices.DEVICE_VARIABLE
-    selector = os.environ.get(variable, "").strip()
-    if selector:
-        try:
+    infos, variable = list_devices(), devices.DEVICE_VARIABLE
+    selector, best = os.environ.get(variable, "").strip(), None
+    try:
+        if selector:
             best = devices.select(infos, selector, f"{variable}=")
-            last = f"Default: {best.full_name}, because {variable}={selector!r}."
             if not best.usable:
-                last = f"No default: {_unusable(best, f'{variable}={selector!r}')}."
-                best = None
-        except NoDeviceError as exc:
-            best, last = None, f"No default: {exc}."
-    elif best is None:
-        last = devices.no_device_message(infos, []) + "."
-    else:
-        last = (
-            f"Default: {best.full_name}; GPUs come first, then CPUs, Intel's before PoCL.\n"
-            f"Choose another with device=, --device or {variable}."
-        )
+                raise NoDeviceError(_unusable(best, f"{variable}={selector!r}"))
+            last = f"Default: {best.full_name}, because {variable}={selector!r}."
+        else:
+            usable = [info for info in infos if info.usable]
+            if not usable:
+                raise NoDeviceError(devices.no_device_message(infos))
+            best = min(usable, key=devices.preference)
+            last = (
+                f"Default: {best.full_name}; GPUs come first, then CPUs, Intel's before PoCL.\n"
+                f"Choose another with device=, --device or {variable}."
+            )
+    except NoDeviceError as error:
+        best, last = None, f"No default: {error}."
     lines = [
         f"{'*' if info is best else ' '} [{info.platform_index}:{info.device_index}] "
         f"{info.full_name}\n"
         f"    {info.kind}, {info.compute_units} compute units, {bytes_text(info.global_memory)} "
-        f"memory, {bytes_text(info.max_allocation)} per buffer, "
-        f"{'fp64' if info.has_fp64 else 'no fp64'}\n"
+        f"memory, {bytes_text(info.max_allocation)} per buffer\n"
         f"    {info.version}, driver {info.driver}, selector {info.selector!r}\n"
         f"    {'usable' if info.usable else f'not used: {info.reason}'}"
         for info in infos
     ]
-    return "\n".join([*lines, last, *(f"Note: {note}." for note in notes if note not in last)])
-
-
-def _best() -> Runtime:
-    """Find the first device that passes the probe, and remember it: the drivers' list is fixed."""
-    global _default
-    infos, notes = devices.find_devices()
-    for info in sorted(infos, key=devices.preference):
-        _default = _probe(info)[1]
-        if _default is not None:
-            return _default
-    raise NoDeviceError(devices.no_device_message(list_devices(), notes))
-
-
-def _named(device: Any, origin: str) -> Runtime:
-    """Return the runtime of a device that is asked for in any way."""
-    infos, _ = devices.find_devices()
-    same = [
-        info
-        for info in infos
-        if getattr(device, "int_ptr", None) == devices.handles[info.index].int_ptr
-        or (getattr(device, "full_name", None) == info.full_name and device.index == info.index)
-    ]
-    if isinstance(device, str):
-        same = [devices.select(infos, device, origin)]
-    elif not (isinstance(device, DeviceInfo) or hasattr(device, "int_ptr")):
-        raise InvalidArgumentError(
-            f"device={device!r} of type {type(device).__name__}: give a name, a DeviceInfo, a "
-            "Runtime or a pyopencl.Device"
-        )
-    if not same:
-        raise NoDeviceError(
-            f"the device {getattr(device, 'full_name', device)} does not exist in this process (a "
-            f"sub-device, or a context?); there is {devices.listing(infos)}"
-        )
-    probed, runtime = _probe(same[0])
-    if runtime is None:
-        raise NoDeviceError(_unusable(probed, f"{origin}{device!r}"))
-    return runtime
+    return "\n".join([*lines, last])
 
 
 def _unusable(info: DeviceInfo, asked: str) -> str:
@@ -165,7 +140,7 @@ def _unusable(info: DeviceInfo, asked: str) -> str:
 def _probe(info: DeviceInfo) -> tuple[DeviceInfo, Runtime | None]:
     """Run the probe kernel, once per device and process."""
     with _lock:
-        if info.index not in _probed:
+        if info.selector not in _probed:
             runtime, reason = None, ""
             try:
                 runtime = Runtime(info)
@@ -175,8 +150,8 @@ def _probe(info: DeviceInfo) -> tuple[DeviceInfo, Runtime | None]:
             info = replace(info, usable=not reason, reason=reason)
             if runtime is not None:
                 runtime.info = info
-            _probed[info.index] = (info, None if reason else runtime)
-        return _probed[info.index]
+            _probed[info.selector] = (info, None if reason else runtime)
+        return _probed[info.selector]
 
 
 def run_probe(runtime: Runtime) -> str:

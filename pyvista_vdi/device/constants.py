@@ -42,22 +42,17 @@ STEEPEST = 1.5
 #: rows (``multi_vdi/pool.cl``).
 SEGMENT_SIZE, SPARE_SLOTS = 6, 2
 
-#: By folder of ``opencl/``, those that programs with a file of it know.
-OF_FOLDERS: dict[str, str] = {
-    "generation": "RUN_WORDS LISTS_PER_ITEM",
-    "large": "RUN_WORDS",
-    "lib": "STRIP COLUMN_ITEMS CELL CELL_ITEMS PLANE_FORMS",
-    "multi_vdi": "CELL CELL_ITEMS SEGMENT_SIZE SPARE_SLOTS",
-    "raycasting": "BUNDLE_SHIFT BUNDLE FIRST_BITS LIST_HEADER STACK_SHIFT STACK SLABS DEPTH_CODES "
-    "STEEPEST",
-    "volume": "MACROCELL_SHIFT",
-}
+#: Those that kernels know.
+_OF_KERNELS = (
+    "STRIP COLUMN_ITEMS CELL CELL_ITEMS MACROCELL_SHIFT RUN_WORDS LISTS_PER_ITEM BUNDLE_SHIFT "
+    "BUNDLE FIRST_BITS LIST_HEADER STACK_SHIFT STACK SLABS DEPTH_CODES PLANE_FORMS STEEPEST "
+    "SEGMENT_SIZE SPARE_SLOTS"
+)
 
 
-def definitions(folders: set[str]) -> list[str]:
-    """Return the lines of OpenCL C that define what programs with files of some folders know."""
-    names = {name for folder in folders for name in OF_FOLDERS.get(folder, "").split()}
-    return [f"#define {name} {literal(globals()[name])}" for name in sorted(names)]
+def definitions() -> list[str]:
+    """Return the lines of OpenCL C that define them."""
+    return [f"#define {name} {literal(globals()[name])}" for name in _OF_KERNELS.split()]
 
 
 def literal(value: object) -> str:

@@ -4,22 +4,17 @@ Everything here but :func:`find_devices` works on plain :class:`DeviceInfo` list
 driver.
 """
 
+import contextlib
 import importlib
 import os
-import re
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from pyvista_vdi.device.icd import (
-    after_listing,
-    drivers_visible,
-    own_loader_bound,
-    pocl_cache_at_hand,
-)
+from pyvista_vdi.device.icd import drivers_visible, intel_library, own_loader_bound
 from pyvista_vdi.errors import DeviceError, MissingDependencyError, NoDeviceError
 from pyvista_vdi.model.user_cache import writable_cache
 
@@ -33,8 +28,6 @@ REMEDY = (
 #: Why a device that nobody has tried yet is not used.
 NOT_PROBED = "not probed"
 
-_KIND_RANK = {"GPU": 0, "CPU": 1, "accelerator": 2}
-
 
 @dataclass(frozen=True)
 class DeviceInfo:
@@ -42,7 +35,7 @@ class DeviceInfo:
 
     Attributes
     ----------
-    name, platform, vendor, version, driver : str
+    name, platform, version, driver : str
         As the driver reports them; ``version`` is the device's OpenCL version.
     kind : str
         ``"GPU"``, ``"CPU"`` or ``"accelerator"``.
@@ -50,33 +43,28 @@ class DeviceInfo:
         Parallel compute units; hardware threads on a CPU.
     global_memory, max_allocation : int
         Bytes in all, and bytes that one buffer may have.
-    has_fp64 : bool
-        Whether kernels may use ``double``.
     usable : bool
         Whether the probe kernel ran on it and gave the right numbers.
     reason : str
         Why it is not used; empty when usable.
-    selector : str
-        Short string that selects exactly this device.
     platform_index, device_index : int
-        Position in the driver's lists; ``"platform_index:device_index"`` selects it too.
+        Position in the driver's lists.
+    selector : str
+        ``"platform_index:device_index"``, which selects exactly this device.
     unified_memory : bool
         Whether device and host share memory.
     """
 
     name: str
     platform: str
-    vendor: str
     version: str
     driver: str
     kind: str
     compute_units: int
     global_memory: int
     max_allocation: int
-    has_fp64: bool
     usable: bool = False
     reason: str = NOT_PROBED
-    selector: str = ""
     platform_index: int = 0
     device_index: int = 0
     unified_memory: bool = False
@@ -87,9 +75,9 @@ class DeviceInfo:
         return f"{self.platform} / {self.name}"
 
     @property
-    def index(self) -> tuple[int, int]:
-        """Platform index and device index: what identifies a device in this process."""
-        return (self.platform_index, self.device_index)
+    def selector(self) -> str:
+        """What selects exactly this device in this process."""
+        return f"{self.platform_index}:{self.device_index}"
 
 
 def preference(info: DeviceInfo) -> tuple[int, ...]:
@@ -100,71 +88,31 @@ def preference(info: DeviceInfo) -> tuple[int, ...]:
     faster than PoCL on a plain volume raycaster, on AMD CPUs as well.
     """
     return (
-        _KIND_RANK.get(info.kind, len(_KIND_RANK)),
+        ("GPU", "CPU", "accelerator").index(info.kind),
         int(info.kind == "GPU" and info.unified_memory),
         int(info.kind == "CPU" and "intel" not in info.platform.lower()),
         -info.compute_units,
-        *info.index,
-    )
-
-
-def match(infos: Sequence[DeviceInfo], selector: str) -> list[DeviceInfo]:
-    """Return the devices that a selector means: none, one, or several if it is ambiguous.
-
-    It is ``"platform_index:device_index"``, ``"platform:device_index"``, or a part of
-    ``"platform / device"`` or of the version. Letter case is ignored; an exact name beats a part of
-    one, and a part of the platform beats one of the device.
-    """
-    text = re.sub(r"\s*:\s*", ":", selector.strip().lower())
-    platform, _, number = text.rpartition(":")
-    if platform.isdigit() and number.isdigit():
-        return [info for info in infos if info.index == (int(platform), int(number))]
-    ways: tuple[Callable[[DeviceInfo], bool], ...] = (
-        lambda i: text in (i.full_name.lower(), i.name.lower(), i.selector.lower()),
-        # "intel" is a platform before it is the processor that PoCL runs on; "pocl" is in versions
-        lambda i: text in i.platform.lower(),
-        lambda i: text in i.full_name.lower(),
-        lambda i: text in f"{i.version} {i.driver}".lower(),
-        lambda i: platform != "" and platform in i.platform.lower() and number == str(i.index[1]),
-    )
-    return next((found for way in ways if (found := [i for i in infos if way(i)])), [])
-
-
-def with_selectors(infos: Sequence[DeviceInfo]) -> list[DeviceInfo]:
-    """Return the same devices, each with the shortest kind of selector that means it alone."""
-    platforms = {(info.platform.lower(), info.platform_index) for info in infos}
-    names = [name for name, _ in platforms]
-    return [
-        replace(info, selector=f"{name if names.count(name) == 1 else number}:{info.device_index}")
-        for info in infos
-        for name, number in [(info.platform.lower(), info.platform_index)]
-    ]
-
-
-def listing(infos: Sequence[DeviceInfo]) -> str:
-    """Return the devices in one sentence, for error messages."""
-    return (
-        "; ".join(
-            f"{info.full_name} ({info.kind}, selected by {info.selector!r}"
-            + (
-                ""
-                if info.usable or info.reason in ("", NOT_PROBED)
-                else f", not usable: {info.reason}"
-            )
-            + ")"
-            for info in infos
-        )
-        or "no device at all"
+        info.platform_index,
+        info.device_index,
     )
 
 
 def select(infos: Sequence[DeviceInfo], selector: str, origin: str) -> DeviceInfo:
-    """Return the one device that a selector means, see :func:`match`.
+    """Return the one device that a selector means.
 
-    ``origin`` is where the selector came from, for messages: ``"device="``, say. NoDeviceError if
-    it means none or several, with a list of what exists.
+    It is ``"platform_index:device_index"``, or a part of ``"platform / device"`` or of the version.
+    Letter case is ignored; an exact name beats a part of one, and a part of the platform beats one
+    of the device. ``origin`` is where the selector came from, for messages: ``"device="``, say.
+    NoDeviceError if it means none or several, with a list of what exists.
     """
-    found = match(infos, selector)
+    text = selector.strip().lower()
+    ways: tuple[Callable[[DeviceInfo], bool], ...] = (
+        lambda i: text in (i.selector, i.full_name.lower(), i.name.lower()),
+        # "intel" is a platform before it is the processor that PoCL runs on; "pocl" is in versions
+        lambda i: text in i.platform.lower(),
+        lambda i: text in f"{i.full_name} {i.version} {i.driver}".lower(),
+    )
+    found = next((found for way in ways if (found := [i for i in infos if way(i)])), [])
     if len(found) == 1:
         return found[0]
     if found:
@@ -178,11 +126,20 @@ def select(infos: Sequence[DeviceInfo], selector: str, origin: str) -> DeviceInf
     )
 
 
-def no_device_message(infos: Sequence[DeviceInfo], notes: Sequence[str]) -> str:
+def listing(infos: Sequence[DeviceInfo]) -> str:
+    """Return the devices in one sentence, for error messages."""
+    found = []
+    for info in infos:
+        unusable = info.reason not in ("", NOT_PROBED)
+        why = f", not usable: {info.reason}" if unusable else ""
+        found.append(f"{info.full_name} ({info.kind}, selected by {info.selector!r}{why})")
+    return "; ".join(found) or "no device at all"
+
+
+def no_device_message(infos: Sequence[DeviceInfo]) -> str:
     """Return what was found where nothing can be used, why it failed, and what to do."""
     found = f"found {listing(infos)}" if infos else "no OpenCL driver lists a device"
-    details = "".join(f"; {note}" for note in notes if note and note != advice)
-    return f"no usable OpenCL device: {found}{details}. Remedy: {advice}"
+    return f"no usable OpenCL device: {found}. Remedy: {advice}"
 
 
 def bytes_text(nbytes: int) -> str:
@@ -194,9 +151,9 @@ def bytes_text(nbytes: int) -> str:
 
 
 _lock = threading.RLock()
-_found: tuple[list[DeviceInfo], list[str]] | None = None
-#: The driver's own object of each device, by its index.
-handles: dict[tuple[int, int], Any] = {}
+_found: list[DeviceInfo] | None = None
+#: The driver's own object of each device, by its selector.
+handles: dict[str, Any] = {}
 #: What to do where no device will do; what is installed already is not advised.
 advice = REMEDY
 #: Whether drivers are here that the threads they work with did not follow into a fork.
@@ -254,11 +211,11 @@ def _import_pyopencl() -> ModuleType:
     return cl
 
 
-def find_devices() -> tuple[list[DeviceInfo], list[str]]:
+def find_devices() -> list[DeviceInfo]:
     """Return every device of every platform, unprobed, in the drivers' order, listed once.
 
-    Also notes on how they were looked for. MissingDependencyError if pyopencl cannot be imported,
-    DeviceError in a fork of a process that had listed them.
+    MissingDependencyError if pyopencl cannot be imported, DeviceError in a fork of a process that
+    had listed them.
     """
     global _found, advice
     require_drivers()
@@ -266,35 +223,28 @@ def find_devices() -> tuple[list[DeviceInfo], list[str]]:
         return _found  # likewise without a lock
     with _lock:
         if _found is None:
-            with drivers_visible() as discovery, pocl_cache_at_hand():
-                early = "pyopencl" in sys.modules
-                cl = _import_pyopencl()
-                infos, notes = _list(cl)
-                discovery = after_listing(discovery) if early else discovery
-            advice = discovery.note if discovery.hidden else REMEDY
-            _found = infos, [discovery.note, *notes]
+            with drivers_visible():
+                found = _list(_import_pyopencl())
+            library, platforms = intel_library(), {info.platform for info in found}
+            if library and not any(name.startswith("Intel(R) OpenCL") for name in platforms):
+                advice = (
+                    f"have pip's {library} listed, which no loader does: unset OCL_ICD_VENDORS and "
+                    "OCL_ICD_FILENAMES, and move  import pyopencl  below the first use of a "
+                    "device by pyvista_vdi, pyvista_vdi.list_devices() for instance"
+                )
+            _found = found
         return _found
 
 
-def _list(cl: ModuleType) -> tuple[list[DeviceInfo], list[str]]:
-    notes, infos = [], []
-    try:
-        platforms = cl.get_platforms()
-    except cl.Error as exc:  # PLATFORM_NOT_FOUND_KHR: the loader knows no driver
-        return [], [f"the OpenCL loader says: {exc}"]
-    for platform_index, platform in enumerate(platforms):
-        try:
-            devices = platform.get_devices()
-        except cl.Error as exc:
-            notes.append(f"the platform {platform.name.strip()!r} lists no device: {exc}")
-            continue
-        for device_index, device in enumerate(devices):
-            try:
-                infos.append(_describe(cl, device, platform_index, device_index))
-                handles[infos[-1].index] = device
-            except cl.Error as exc:
-                notes.append(f"device {platform_index}:{device_index} cannot be queried: {exc}")
-    return with_selectors(infos), notes
+def _list(cl: ModuleType) -> list[DeviceInfo]:
+    infos = []
+    with contextlib.suppress(cl.Error):  # PLATFORM_NOT_FOUND_KHR: the loader knows no driver
+        for platform_index, platform in enumerate(cl.get_platforms()):
+            with contextlib.suppress(cl.Error):  # a platform without a device, or a broken one
+                for device_index, device in enumerate(platform.get_devices()):
+                    infos.append(_describe(cl, device, platform_index, device_index))
+                    handles[infos[-1].selector] = device
+    return infos
 
 
 def _describe(cl: ModuleType, device: Any, platform_index: int, device_index: int) -> DeviceInfo:
@@ -302,14 +252,12 @@ def _describe(cl: ModuleType, device: Any, platform_index: int, device_index: in
     return DeviceInfo(
         name=device.name.strip(),
         platform=device.platform.name.strip(),
-        vendor=device.vendor.strip(),
         version=device.version.strip(),
         driver=device.driver_version.strip(),
         kind=next((name for bit, name in kinds.items() if device.type & bit), "accelerator"),
         compute_units=int(device.max_compute_units),
         global_memory=int(device.global_mem_size),
         max_allocation=int(device.max_mem_alloc_size),
-        has_fp64="cl_khr_fp64" in device.extensions.split(),
         platform_index=platform_index,
         device_index=device_index,
         unified_memory=bool(device.host_unified_memory),

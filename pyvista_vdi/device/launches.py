@@ -2,17 +2,18 @@
 
 import math
 import operator
+import threading
 import time
 from collections.abc import Mapping
 from contextlib import nullcontext
-from pathlib import Path
 from typing import Any
 
+from pyvista_vdi.device import programs
 from pyvista_vdi.device.devices import DeviceInfo
 from pyvista_vdi.device.memory import DeviceBuffer, Memory
-from pyvista_vdi.device.programs import Define, Kernel, KernelDeclaration, ProgramCache
+from pyvista_vdi.device.programs import Define, Kernel, KernelDeclaration
 from pyvista_vdi.device.scheduling import Worker
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.errors import InvalidArgumentError, KernelBuildError
 
 Size = int | tuple[int, ...]
 
@@ -49,7 +50,7 @@ class Launch:
             self._kernel.free.append(self._object)
 
     def __repr__(self) -> str:
-        return f"<Launch of {self._kernel!r}>"
+        return f"<Launch of {self._kernel.name!r}>"
 
     def set(self, **arguments: Any) -> None:
         """Set some of the arguments; parameters and errors are those of :meth:`Runtime.bind`."""
@@ -66,7 +67,7 @@ class Launch:
                 given = value.used() if is_buffer else parameter.given(device.cl, value)
                 if is_buffer and not parameter.holds(value.dtype):
                     raise TypeError
-                self._object.set_arg(parameter.index, given)
+                self._object.set_arg(parameter.place, given)
             except (AttributeError, OverflowError, TypeError, ValueError) as exc:
                 raise TypeError(
                     f"argument {name!r} of kernel {kernel.name!r} is declared as {parameter.kind}; "
@@ -101,7 +102,7 @@ class Launch:
                 f"{', '.join(self._missing)}"
             )
         for buffer in self._buffers.values():
-            device.note_use(buffer)
+            buffer.used()
 
         # Check the sizes
         whole = tuple(map(int, size)) if isinstance(size, tuple) else (int(size),)
@@ -156,14 +157,19 @@ class Runtime(Memory):
     """A device ready for work. Made by :func:`~pyvista_vdi.device.get_runtime`.
 
     Every method may be called from any thread. Commands run in the order in which they are
-    enqueued, one queue for all threads unless :meth:`queue_scope` gives a thread its own. What one
-    queue has written another sees when the first has been finished, see :meth:`finish`. Threads
-    must have ended before the interpreter does: drivers do not survive use at exit.
+    enqueued. Threads must have ended before the interpreter does: drivers do not survive use at
+    exit.
     """
 
     def __init__(self, info: DeviceInfo) -> None:
         super().__init__(info)
-        self._programs = ProgramCache(self._context, self._device)
+        self._kernels: dict[tuple[Any, ...], Kernel] = {}
+        self._programs: dict[tuple[Any, ...], Any] = {}
+        self._locks: dict[tuple[Any, ...], threading.Lock] = {}
+        self._options = ["-cl-std=CL1.2"]
+        rounded = self.cl.device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT
+        if self._device.single_fp_config & rounded:
+            self._options.append("-cl-fp32-correctly-rounded-divide-sqrt")
 
     def bind(
         self,
@@ -176,28 +182,46 @@ class Runtime(Memory):
 
         ``defines`` are ``-D`` options: what changes the code's shape; floats become exact float32
         literals. Arguments are those that are known already. Numbers are converted to the declared
-        type, which they must fit; vectors are given as arrays or sequences, local memory as
-        elements for each work-group; None is a null pointer.
+        type, which they must fit; vectors are given as arrays or sequences, structures as
+        dictionaries of their fields, local memory as elements for each work-group; None is a null
+        pointer.
 
         Raises KernelBuildError if it cannot be assembled or compiled, InvalidArgumentError if a
-        name is no argument's or a define cannot be written as an option, TypeError if a value is
-        not of its argument's type, and DeviceError if a buffer has been released.
+        name is no argument's, TypeError if a value is not of its argument's type, and DeviceError
+        if a buffer has been released.
         """
-        kernel = self.kernel(declaration.path, declaration.name, defines)
-        if not kernel.parameters:
-            kernel.declare(declaration, defines or {})
-        launch = Launch(self, kernel)
+        launch = Launch(self, self.kernel(declaration, defines or {}))
         launch.set(**arguments)
         return launch
 
-    def kernel(
-        self, path: str | Path, name: str, defines: Mapping[str, Define] | None = None
-    ) -> Kernel:
-        """Return a kernel, compiled when first asked for and kept; threads may share it.
+    def kernel(self, declaration: KernelDeclaration, defines: Mapping[str, Define]) -> Kernel:
+        """Return a kernel, compiled when first asked for, and the same for the same source.
 
-        Parameters are those of a :class:`KernelDeclaration` and of :meth:`bind`, as
-        KernelBuildError is. Background work compiles beside frames: that takes seconds, and not the
-        device.
+        Threads may share it. KernelBuildError if it cannot be assembled or compiled, or the file
+        has no such function. Background work compiles beside frames: that takes seconds, and not
+        the device.
         """
-        aside = nullcontext if self.thread.worker is None else self.aside
-        return self._programs.kernel(path, name, defines or {}, aside)
+        path, options = declaration.path, (*self._options, *programs.define_options(defines))
+        source = programs.expand(path)
+        program, key = (source, options), (source, declaration.name, options)
+        if key in self._kernels:
+            return self._kernels[key]
+        aside = nullcontext() if self.thread.worker is None else self.aside()
+        # Different programs are compiled side by side. OpenCL has every function thread safe but
+        # the one that sets arguments (1.2, A.2); compilers that are not are locked by their drivers
+        with aside, self._locks.setdefault(program, threading.Lock()):
+            if program not in self._programs:
+                of = self._context, self._device, str(path)
+                self._programs[program] = programs.build(*of, source, options)
+            if key not in self._kernels:
+                try:
+                    made = Kernel(self._programs[program], declaration, defines)
+                except self.cl.Error as exc:
+                    names = self._programs[program].kernel_names.replace(";", ", ") or "none"
+                    raise KernelBuildError(
+                        f"{path} has no kernel {declaration.name!r}; with these options it has: "
+                        f"{names}",
+                        options=" ".join(options),
+                    ) from exc
+                self._kernels[key] = made
+            return self._kernels[key]

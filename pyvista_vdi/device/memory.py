@@ -1,10 +1,10 @@
-"""A device's command queues and its memory: buffers, checked before they are taken, and copies."""
+"""A device's command queue and its memory: buffers, checked before they are taken, and copies."""
 
 import contextlib
 import math
 import threading
 import weakref
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -23,54 +23,18 @@ MOST_POOLED, BLOCKS_HELD = 64 * 2**20, 4
 #: Bytes that background work copies at a time: about a millisecond at a host memory's pace.
 COPY_BYTES = 4 * 2**20
 
-
-class PinnedArrays:
-    """Arrays in page-locked host memory, into which a GPU copies several times as fast.
-
-    Memory of an array that nobody has any more is given out again. It is scarce: what
-    :data:`PINNED_BYTES` has no room for is in ordinary memory. ``allocate`` takes bytes and returns
-    a uint8 array, and what gives its memory back.
-    """
-
-    def __init__(self, allocate: Callable[[int], tuple[NDArray[np.uint8], Callable[[], None]]]):
-        self._allocate = allocate
-        self._free: list[tuple[NDArray[np.uint8], Callable[[], None]]] = []
-        self._taken = 0  # bytes, those that are free included
-        self._lock = threading.Lock()
-
-    def empty(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
-        """Return an uninitialised array, ordinary memory where there is no room."""
-        nbytes = math.prod(shape) * dtype.itemsize
-        with self._lock:
-            sizes = [memory.nbytes for memory, _ in self._free]
-            while nbytes not in sizes and sizes and self._taken + nbytes > PINNED_BYTES:
-                self._taken -= sizes.pop(0)
-                self._free.pop(0)[1]()
-            if nbytes in sizes:
-                block = self._free.pop(sizes.index(nbytes))
-            elif self._taken + nbytes > PINNED_BYTES:
-                return np.empty(shape, dtype)
-            else:
-                try:
-                    block = self._allocate(nbytes)
-                except DeviceMemoryError:
-                    return np.empty(shape, dtype)
-                self._taken += nbytes
-        # Views have this array as their base, so that it lives as long as they do
-        array = np.frombuffer(memoryview(block[0]), dtype)  # type: ignore[arg-type]
-        weakref.finalize(array, self._free.append, block).atexit = False
-        return array.reshape(shape)
+_SMALLER = "use a smaller volume, window size or max_supersegments, or another device"
 
 
 class Held:
     """What goes back with a buffer: bytes that are accounted for, and the driver's memory.
 
-    ``queues``: where the memory is a host's array, those whose kernels use it.
+    ``in_place``: the memory is a host's array, which may go when the buffer has gone.
     """
 
     nbytes = 0
     memory: Any = None
-    queues: set[Any] | None = None
+    in_place = False
 
 
 class DeviceBuffer:
@@ -83,6 +47,9 @@ class DeviceBuffer:
     that is ``host`` (:meth:`Runtime.result`, :meth:`Runtime.target`).
     """
 
+    memory: Any = None
+    host: NDArray[Any] | None = None
+
     def __init__(
         self,
         shape: tuple[int, ...],
@@ -94,8 +61,6 @@ class DeviceBuffer:
     ) -> None:
         self.shape, self.dtype, self.name, self.writable = shape, dtype, name, writable
         self.nbytes = math.prod(shape) * dtype.itemsize
-        self.memory: Any = None
-        self.host: NDArray[Any] | None = None
         # Nothing is held yet, so that wherever an interrupt comes, what is held goes back
         self.held = Held()
         self._finalizer = weakref.finalize(self, give_back, self.held)
@@ -123,10 +88,6 @@ class DeviceBuffer:
     def __exit__(self, *_: object) -> None:
         self.release()
 
-    def __repr__(self) -> str:
-        state = "released" if self.released else bytes_text(self.nbytes)
-        return f"<DeviceBuffer {self.name!r}: {self.dtype} {self.shape}, {state}>"
-
 
 @contextlib.contextmanager
 def kept_together() -> Iterator[Callable[[DeviceBuffer], DeviceBuffer]]:
@@ -141,7 +102,7 @@ def kept_together() -> Iterator[Callable[[DeviceBuffer], DeviceBuffer]]:
 
 
 class Memory(Turns):
-    """A device and a context on it, a command queue for all threads and for who asks, and buffers.
+    """A device, a context on it, a command queue for all threads, and buffers.
 
     ``cl`` is pyopencl; ``vector_floats`` the floats of the device's longest vectors; ``allocated``
     the bytes that buffers hold now, where arrays used in place count nothing, and
@@ -154,16 +115,16 @@ class Memory(Turns):
         super().__init__()
         self.cl: Any = devices.opencl()
         self.info, self.is_cpu = info, info.kind == "CPU"
-        self._device = devices.handles[info.index]
+        self._device = devices.handles[info.selector]
         self.vector_floats = int(self._device.native_vector_width_float)
-        with self.failing("making a context"):
+        with self.failing("making a context and a command queue"):
             self._context = self.cl.Context([self._device])
-        self._queues: list[Any] = []  # that of all threads first
-        self._new_queue()
+            self._queue = self.cl.CommandQueue(self._context, self._device)
         # Re-entrant: a garbage collection inside the lock may release other buffers
         self._ledger = threading.RLock()
         self._alignment = max(1, int(self._device.mem_base_addr_align) // 8)
-        self.pinned = PinnedArrays(self._pin)
+        self._pinned: list[tuple[Any, Any]] = []  # that nobody has any more
+        self._pinned_bytes = 0
         # Of pictures: to allocate one anew for each frame takes a GPU longer than to draw it
         tools = self.cl.tools
         self._pool = tools.MemoryPool(tools.ImmediateAllocator(self.queue))
@@ -173,34 +134,23 @@ class Memory(Turns):
 
     def failure(self, error: Any, doing: str) -> DeviceError | DeviceMemoryError:
         """Return the package's error for one of the driver's, naming what was being done."""
-        codes = self.cl.status_code
-        code = getattr(error, "code", None)  # what pyopencl raises by itself has none
-        if code in (
+        codes, info = self.cl.status_code, self.info
+        if getattr(error, "code", None) in (  # what pyopencl raises by itself has none
             codes.MEM_OBJECT_ALLOCATION_FAILURE,
             codes.OUT_OF_RESOURCES,
             codes.OUT_OF_HOST_MEMORY,
             codes.INVALID_BUFFER_SIZE,
         ):
             return DeviceMemoryError(
-                f"{self.info.full_name!r} ran out of memory or resources while {doing} "
-                f"({error}); it has {bytes_text(self.info.global_memory)}, of which this "
-                f"process holds {bytes_text(self.allocated)}: use a smaller volume, window "
-                "size or max_supersegments, or another device"
-            )
-        remedy = "try again, or use another device"
-        if code in (
-            codes.DEVICE_NOT_AVAILABLE,
-            codes.INVALID_COMMAND_QUEUE,
-            codes.INVALID_CONTEXT,
-            codes.INVALID_DEVICE,
-        ):
-            remedy = (
-                "it may be lost (unplugged, or reset by its driver): start the program again, or "
-                "use another device"
+                f"{info.full_name!r} ran out of memory or resources while {doing} ({error}); it "
+                f"has {bytes_text(info.global_memory)}, of which this process holds "
+                f"{bytes_text(self.allocated)}: {_SMALLER}"
             )
         return DeviceError(
-            f"{self.info.full_name!r} failed while {doing}: {error}; {remedy} (device=, or the "
-            f"environment variable {devices.DEVICE_VARIABLE}; pyvista-vdi devices lists them)"
+            f"{info.full_name!r} failed while {doing}: {error}; try again, start the program again "
+            "if the device was lost (unplugged, or reset by its driver), or use another device "
+            f"(device=, or the environment variable {devices.DEVICE_VARIABLE}; pyvista-vdi devices "
+            "lists them)"
         )
 
     @contextlib.contextmanager
@@ -213,61 +163,14 @@ class Memory(Turns):
 
     @property
     def queue(self) -> Any:
-        """The calling thread's queue; an error in a fork, where its driver would wait for ever."""
+        """The queue of all threads; an error in a fork, where its driver would wait for ever."""
         devices.require_drivers()
-        return self.thread.queue or self._queues[0]
-
-    def _new_queue(self) -> Any:
-        with self.failing("making a command queue"):
-            self._queues.append(queue := self.cl.CommandQueue(self._context, self._device))
-        return queue
-
-    @contextlib.contextmanager
-    def queue_scope(self) -> Iterator[None]:
-        """Open an in-order command queue of the calling thread's own for the ``with`` block.
-
-        What was enqueued before is finished first, and what is enqueued inside is finished at
-        the end, so buffers may cross the borders of the block.
-        """
-        self.finish()
-        outer, inner = self.thread.queue, self._new_queue()
-        self.thread.queue = inner
-        try:
-            yield
-        finally:
-            self.thread.queue = outer
-            try:
-                self._finish([inner])
-            finally:
-                self._queues.remove(inner)
-
-    def _finish(self, queues: Iterable[Any]) -> None:
-        """Finish queues where their driver is."""
-        with self.failing("waiting for enqueued work"):
-            for queue in () if devices.forked else queues:
-                queue.finish()
+        return self._queue
 
     def finish(self) -> None:
-        """Wait until all is done that was enqueued on the calling thread's queue.
-
-        Threads outside :meth:`queue_scope` share one. A buffer that a thread with a queue of its
-        own has written may be handed to another thread after this. DeviceError if a kernel failed.
-        """
-        self._finish([self.queue])
-
-    @contextlib.contextmanager
-    def background(
-        self,
-        cancelled: Callable[[], bool] = lambda: False,
-        paused: Callable[[], bool] = lambda: False,
-    ) -> Iterator[None]:
-        """Work as :meth:`Turns.background` has it, on a queue of the calling thread's own.
-
-        Its launches and copies are cut into pieces that take no longer than a turn; each is
-        finished when the call returns.
-        """
-        with self.queue_scope(), super().background(cancelled, paused):
-            yield
+        """Wait until all is done that was enqueued; DeviceError if a kernel failed."""
+        with self.failing("waiting for enqueued work"):
+            self.queue.finish()
 
     @property
     def in_place_alignment(self) -> int | None:
@@ -290,7 +193,7 @@ class Memory(Turns):
         it. DeviceMemoryError if it is larger than the device allows per buffer or has left, or the
         driver fails.
         """
-        return self.allocate(self.cl.mem_flags.READ_WRITE, shape, np.dtype(dtype), name)
+        return self._take(self.cl.mem_flags.READ_WRITE, shape, np.dtype(dtype), name)
 
     def result(
         self,
@@ -306,11 +209,12 @@ class Memory(Turns):
         is copied, and that array holds what is written afterwards, too. ``lasting`` is as for
         :func:`aligned_empty`; all else, and what is raised, as for :meth:`buffer`.
         """
-        flags, empty = self.cl.mem_flags, 0 in shape
-        in_place = self.is_cpu and not empty
-        access = flags.READ_WRITE | (flags.USE_HOST_PTR if in_place else 0)
-        pooled = not (self.is_cpu or lasting or empty)
-        return self.allocate(access, shape, np.dtype(dtype), name, lasting=lasting, pooled=pooled)
+        flags, own = self.cl.mem_flags, np.dtype(dtype)
+        if self.is_cpu and 0 not in shape:
+            access = flags.READ_WRITE | flags.USE_HOST_PTR
+            return self._take(access, shape, own, name, lasting=lasting)
+        pooled = not (self.is_cpu or lasting or 0 in shape)
+        return self._take(flags.READ_WRITE, shape, own, name, pooled=pooled)
 
     def target(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
         """Return memory for kernels to write what an array is to hold, see :meth:`download`.
@@ -327,9 +231,27 @@ class Memory(Turns):
         access, host = self.cl.mem_flags.READ_WRITE, None
         if self.in_place(array):
             access, host = access | self.cl.mem_flags.USE_HOST_PTR, array
-        return self.allocate(access, array.shape, array.dtype, name, host)
+        return self._take(access, array.shape, array.dtype, name, host)
 
-    def allocate(
+    def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
+        """Return an array's values on the device, for kernels to read; ``name`` says of what.
+
+        A CPU device uses an array that is C-contiguous and aligned for it in place (see
+        :func:`aligned_empty`): do not change the array before the buffer is released. Otherwise
+        the values are copied. The buffer is not writable. Raises as :meth:`buffer` does.
+        """
+        shape, array, flags = np.shape(array), np.ascontiguousarray(array), self.cl.mem_flags
+        in_place, dtype = self.in_place(array), array.dtype
+        if in_place or self.thread.worker is None or array.nbytes <= COPY_BYTES:
+            access = flags.READ_ONLY | (flags.USE_HOST_PTR if in_place else flags.COPY_HOST_PTR)
+            return self._take(access, shape, dtype, name, array, writable=False)
+        # In pieces: a driver that makes a buffer from an array keeps Python's lock
+        with kept_together() as keep:
+            buffer = keep(self._take(flags.READ_ONLY, shape, dtype, name, writable=False))
+            self._copy(buffer, array)
+        return buffer
+
+    def _take(
         self,
         flags: int,
         shape: tuple[int, ...],
@@ -354,21 +276,14 @@ class Memory(Turns):
         taken = 0 if in_place and host is not None else max(nbytes, dtype.itemsize)
         try:
             # Refuse what the device has no room for
-            if max(nbytes, taken) > limits.max_allocation:
-                raise DeviceMemoryError(
-                    f"the buffer {name!r} needs {bytes_text(nbytes)}; {limits.full_name!r} allows "
-                    f"{bytes_text(limits.max_allocation)} per buffer (of "
-                    f"{bytes_text(limits.global_memory)} in all): use a smaller volume, window "
-                    "size or max_supersegments, or another device"
-                )
             with self._ledger:
-                if self.allocated + taken > limits.global_memory:
+                left, largest = limits.global_memory - self.allocated, limits.max_allocation
+                if nbytes > largest or taken > min(left, largest):
                     raise DeviceMemoryError(
-                        f"the buffer {name!r} needs {bytes_text(nbytes)} and "
-                        f"{bytes_text(self.allocated)} are in use already; {limits.full_name!r} "
-                        f"has {bytes_text(limits.global_memory)} in all: release VDIs or volumes "
-                        "that are no longer drawn, use a smaller window size or "
-                        "max_supersegments, or another device"
+                        f"the buffer {name!r} needs {bytes_text(nbytes)}; {limits.full_name!r} "
+                        f"allows {bytes_text(largest)} per buffer, and of its "
+                        f"{bytes_text(limits.global_memory)} {bytes_text(self.allocated)} are in "
+                        f"use: release VDIs or volumes that are no longer drawn, {_SMALLER}"
                     )
                 # One statement without a call: no interrupt comes between the two
                 self.allocated, held.nbytes = self.allocated + taken, taken
@@ -376,14 +291,7 @@ class Memory(Turns):
 
             # Take it
             if in_place and host is None:
-                try:
-                    host = aligned_empty(shape, dtype, lasting=lasting)
-                except MemoryError as exc:
-                    raise DeviceMemoryError(
-                        f"there is no host memory for the buffer {name!r} of "
-                        f"{bytes_text(nbytes)}: close other programs, or use a smaller volume, "
-                        "window size or max_supersegments"
-                    ) from exc
+                host = aligned_empty(shape, dtype, lasting=lasting)
             with self.failing(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
                 if pooled and nbytes <= MOST_POOLED:
                     if self._pool.held_blocks > BLOCKS_HELD:  # of windows that were larger once
@@ -394,67 +302,61 @@ class Memory(Turns):
                     held.memory = cl.Buffer(self._context, flags, size=taken)
                 else:
                     held.memory = cl.Buffer(self._context, flags, hostbuf=host)
-        except BaseException:
+        except BaseException as error:
             buffer.release()  # now: whoever keeps the error keeps this frame
+            if isinstance(error, MemoryError) and not isinstance(error, DeviceMemoryError):
+                raise DeviceMemoryError(
+                    f"there is no host memory for the buffer {name!r} of {bytes_text(nbytes)}: "
+                    f"close other programs, or {_SMALLER}"
+                ) from error
             raise
-        held.queues, buffer.memory = set() if in_place else None, held.memory
+        held.in_place, buffer.memory = in_place, held.memory
         buffer.host = host if in_place and writable else None
         return buffer
-
-    def note_use(self, buffer: DeviceBuffer) -> Any:
-        """Return the driver's memory for the calling thread's queue, and remember who uses it."""
-        memory, held, queue = buffer.used(), buffer.held, self.queue
-        if held.queues is not None and queue not in held.queues:
-            with self._ledger:
-                held.queues = {each for each in held.queues if each in self._queues} | {queue}
-        return memory
 
     def _release(self, held: Held) -> None:
         """Take back what a buffer has held."""
         with self._ledger:
             self.allocated, held.nbytes = self.allocated - held.nbytes, 0
         try:
-            self._finish(held.queues or ())  # the array may go when the buffer has gone
+            if held.in_place and not devices.forked:  # the array may go when the buffer has gone
+                self.finish()
         finally:
             if held.memory is not None:
                 held.memory.release()
 
-    def _pin(self, nbytes: int) -> tuple[NDArray[np.uint8], Callable[[], None]]:
-        """Return page-locked host memory, and what gives it back."""
-        cl, queue = self.cl, self.queue
-        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.ALLOC_HOST_PTR
-        access = cl.map_flags.READ | cl.map_flags.WRITE
-        with self.failing(f"allocating {bytes_text(nbytes)} of page-locked host memory"):
-            memory = cl.Buffer(self._context, flags, nbytes)
-            mapped, _ = cl.enqueue_map_buffer(queue, memory, access, 0, (nbytes,), np.uint8)
+    def pinned(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
+        """Return an uninitialised array, into which a GPU copies several times as fast.
 
-        def release() -> None:
-            mapped.base.release(self.queue)
-            memory.release()
-
-        return mapped, release
-
-    def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
-        """Return an array's values on the device, for kernels to read; ``name`` says of what.
-
-        A CPU device uses an array that is C-contiguous and aligned for it in place (see
-        :func:`aligned_empty`): do not change the array before the buffer is released. Otherwise
-        the values are copied. The buffer is not writable. Raises as :meth:`buffer` does.
+        It is in page-locked memory, which is given out again when nobody has the array any more.
+        That is scarce: what :data:`PINNED_BYTES` has no room for is in ordinary memory.
         """
-        shape, array, flags = np.shape(array), np.ascontiguousarray(array), self.cl.mem_flags
-        in_place, dtype = self.in_place(array), array.dtype
-        if in_place or self.thread.worker is None or array.nbytes <= COPY_BYTES:
-            access = flags.READ_ONLY | (flags.USE_HOST_PTR if in_place else flags.COPY_HOST_PTR)
-            return self.allocate(access, shape, dtype, name, array, writable=False)
-
-        # In pieces: a driver that makes a buffer from an array keeps Python's lock
-        buffer = self.allocate(flags.READ_ONLY, shape, dtype, name, writable=False)
-        try:
-            self._copy(buffer, array)
-        except BaseException:
-            buffer.release()
-            raise
-        return buffer
+        cl, nbytes = self.cl, math.prod(shape) * dtype.itemsize
+        with self._ledger:
+            sizes = [memory.nbytes for _, memory in self._pinned]
+            while nbytes not in sizes and sizes and self._pinned_bytes + nbytes > PINNED_BYTES:
+                self._pinned_bytes -= sizes.pop(0)
+                block, mapped = self._pinned.pop(0)
+                mapped.base.release(self.queue)
+                block.release()
+            if nbytes in sizes:
+                block, mapped = self._pinned.pop(sizes.index(nbytes))
+            elif self._pinned_bytes + nbytes > PINNED_BYTES:
+                return np.empty(shape, dtype)
+            else:
+                access = cl.map_flags.READ | cl.map_flags.WRITE
+                flags = cl.mem_flags.READ_WRITE | cl.mem_flags.ALLOC_HOST_PTR
+                try:
+                    block = cl.Buffer(self._context, flags, nbytes)
+                    place = self.queue, block, access, 0, (nbytes,), np.uint8
+                    mapped, _ = cl.enqueue_map_buffer(*place)
+                except cl.Error:
+                    return np.empty(shape, dtype)
+                self._pinned_bytes += nbytes
+        # Views have this array as their base, so that it lives as long as they do
+        array = np.frombuffer(memoryview(mapped), dtype)
+        weakref.finalize(array, self._pinned.append, (block, mapped)).atexit = False
+        return array.reshape(shape)
 
     def download(self, buffer: DeviceBuffer, out: NDArray[Any] | None = None) -> NDArray[Any]:
         """Return the values of a buffer, when all that was enqueued before is done.
@@ -468,14 +370,13 @@ class Memory(Turns):
         if out is None:
             waits = self.thread.worker is None
             pins = waits and not self.is_cpu and buffer.nbytes >= LEAST_PINNED
-            out = (self.pinned.empty if pins else np.empty)(buffer.shape, buffer.dtype)
+            out = (self.pinned if pins else np.empty)(buffer.shape, buffer.dtype)
         if buffer.host is None or out.ctypes.data != buffer.host.ctypes.data:
             self._copy(buffer, out, to_host=True)
         elif out.nbytes:
             # Map it: the memory is the array's, so that nothing is copied, and the values stay
             _check_exchange(buffer, out, 0, True)
-            if self.thread.worker is not None:
-                self.give_way()
+            self.give_way()
             cl, queue = self.cl, self.queue
             with self.failing(f"reading the buffer {buffer.name!r}"):
                 access, kind = cl.map_flags.READ, (out.shape, out.dtype)
@@ -533,8 +434,7 @@ class Memory(Turns):
         size = COPY_BYTES if background else max(1, data.nbytes)
         with self.failing(f"{'reading' if to_host else 'writing'} the buffer {buffer.name!r}"):
             for start in range(0, data.nbytes, size):
-                if background:
-                    self.give_way()
+                self.give_way()
                 part, place = data[start : start + size], offset + start
                 if to_host:
                     ends = {"dest": part, "src": memory, "src_offset": place}
@@ -550,11 +450,11 @@ class Memory(Turns):
         """
         _check_writable(buffer)
         pattern = np.uint8(value) if isinstance(value, int) else value
-        memory, queue, cl = self.note_use(buffer), self.queue, self.cl
+        memory, queue = buffer.used(), self.queue
         if buffer.nbytes == 0:
             return
         with self.failing(f"filling the buffer {buffer.name!r}"):
-            cl.enqueue_fill_buffer(queue, memory, pattern, 0, buffer.nbytes)
+            self.cl.enqueue_fill_buffer(queue, memory, pattern, 0, buffer.nbytes)
             if self.thread.worker is not None:
                 queue.finish()  # nothing of this thread runs when its turn is over
 

@@ -14,7 +14,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import Any
 
 from pyvista_vdi.errors import Cancelled
 
@@ -67,11 +66,10 @@ class Worker:
 
 
 class ThisThread(threading.local):
-    """The calling thread: as one that works in turns, whether it draws a frame, and its queue."""
+    """The calling thread: as one that works in turns, and whether it draws a frame."""
 
     worker: Worker | None = None
     in_frame = False
-    queue: Any = None  # its own, if it has one
 
 
 class Turns:
@@ -134,8 +132,9 @@ class Turns:
     ) -> Iterator[None]:
         """Work inside the ``with`` block only when no frame is in progress.
 
-        Nor while ``paused()`` is true: frames then wait for nothing of it. ``cancelled`` is asked
-        between pieces: True ends the work with :class:`Cancelled`.
+        Nor while ``paused()`` is true: frames then wait for nothing of it. Launches and copies are
+        cut into pieces that take no longer than a turn; each is finished when the call returns.
+        ``cancelled`` is asked between pieces: True ends the work with :class:`Cancelled`.
         """
         if self.thread.worker is not None or self.thread.in_frame:
             raise RuntimeError("background work cannot begin inside a frame or background work")

@@ -112,7 +112,7 @@ def generate_deferred(
         "sample_distance": metadata["sample_distance"],
         "importance": points,
     }
-    return DeferredVDI.of_lists(lists, about).with_precision(options.precision)
+    return DeferredVDI(lists, about).with_precision(options.precision)
 
 
 def kept_range(

@@ -1,24 +1,12 @@
-"""The kernels of ``opencl/generation/``, and the structures that they take."""
+"""The kernels of ``opencl/generation/``."""
 
-from pyvista_vdi.device import KernelDeclaration, Struct
-from pyvista_vdi.volume.kernels import CLASSIFIED, RAYS
+from pyvista_vdi.device import KernelDeclaration
 
-#: The numbers of records of runs.
-RECORDING = Struct(
-    "Recording",
-    capacity="int",
-    limit="int",
-    grain="int",
-    window_row="int",
-    finest="float",
-    reference_length="float",
-    hidden_weight="float",
-)
 _MARCH, _LISTS = "generation/march_lists.cl", "generation/offsets.cl"
-MARCH_LISTS = KernelDeclaration(_MARCH, "march_lists", CLASSIFIED, RAYS, RECORDING)
-LONGEST_MARCHES = KernelDeclaration(_MARCH, "longest_marches", CLASSIFIED, RAYS)
-SHORTEN_LISTS = KernelDeclaration("generation/shorten_lists.cl", "shorten_lists", RAYS, RECORDING)
-CUT_LISTS = KernelDeclaration("generation/homogeneity.cl", "cut_lists", RAYS, RECORDING)
+MARCH_LISTS = KernelDeclaration(_MARCH, "march_lists")
+LONGEST_MARCHES = KernelDeclaration(_MARCH, "longest_marches")
+SHORTEN_LISTS = KernelDeclaration("generation/shorten_lists.cl", "shorten_lists")
+CUT_LISTS = KernelDeclaration("generation/homogeneity.cl", "cut_lists")
 SUM_LENGTHS = KernelDeclaration(_LISTS, "sum_lengths")
 LIST_OFFSETS = KernelDeclaration(_LISTS, "list_offsets")
-PACK_LISTS = KernelDeclaration("generation/pack_lists.cl", "pack_lists", RAYS)
+PACK_LISTS = KernelDeclaration("generation/pack_lists.cl", "pack_lists")

@@ -15,7 +15,6 @@ from pyvista_vdi.generation.kernels import (
     LONGEST_MARCHES,
     MARCH_LISTS,
     PACK_LISTS,
-    RECORDING,
     SHORTEN_LISTS,
 )
 from pyvista_vdi.generation.list_arrays import GrowingLists
@@ -35,7 +34,7 @@ class Records:
     ``slices`` cut. On the device are their ``forms``, their ``runs`` and merge ``errors``, the
     merge error that each accepts (``thresholds``: ``finest`` until its record has been full), and
     how many runs it has (``counts``). ``view`` has the numbers of a slice's rays
-    (``kernels.RAYS``), ``recording`` those of the records, which are shortened to what is kept
+    (``RaysOfView``), ``recording`` those of the records, which are shortened to what is kept
     between chunks of a march.
     """
 
@@ -70,8 +69,8 @@ class Records:
             "reference_length": voxel,
             "hidden_weight": options.hidden_weight,
         }
-        self.recording = RECORDING(**numbers, limit=slices.kept)
-        self._budget = RECORDING(**numbers, limit=options.max_supersegments)
+        self.recording = {**numbers, "limit": slices.kept}
+        self._budget = {**numbers, "limit": options.max_supersegments}
         items, capacity = slices.items, slices.capacity
         with ExitStack() as stack:
             keep = stack.enter_context
@@ -112,7 +111,7 @@ class Records:
         rows = Rectangle(x0, x1, y0 + part.first_row, y0 + part.first_row + part.rows)
         self.items = block_items(x1 - x0, part.rows)
         self.lists = part.rows * (x1 - x0)
-        self.view: NDArray[Any] = self.rays.view(self.size, self.planes, rows)
+        self.view = self.rays.view(self.size, self.planes, rows)
         self.runtime.fill(self.counts, np.uint32(0))
         self.runtime.fill(self.thresholds, self.finest)
 

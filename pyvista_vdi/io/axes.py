@@ -1,22 +1,14 @@
-"""Where points lie: maps to the world, and units of length, for every format alike."""
+"""Where points lie: maps to the world, and the unit of lengths, for every format alike."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-#: Powers of ten that prefixes of units stand for.
-_POWERS = {"k": 3, "d": -1, "c": -2, "m": -3, "u": -6, "µ": -6, "n": -9, "p": -12}
-_POWERS |= {"kilo": 3, "deci": -1, "centi": -2, "milli": -3, "micro": -6, "nano": -9, "pico": -12}
-
-#: Units of length in metres, as OME-Zarr and OME-TIFF write them.
-METRES = {"m": 1.0, "meter": 1.0, "Å": 1e-10, "angstrom": 1e-10, "micron": 1e-6, "inch": 0.0254}
-METRES |= {
-    prefix + ("m" if len(prefix) == 1 else "meter"): float(f"1e{power}")
-    for prefix, power in _POWERS.items()
-}
+from pyvista_vdi.errors import UnsupportedError
 
 
 def to_world(steps: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> NDArray[np.float64]:
@@ -31,14 +23,10 @@ def to_world(steps: ArrayLike, origin: ArrayLike = (0.0, 0.0, 0.0)) -> NDArray[n
     return place
 
 
-def in_one_unit(lengths: Sequence[float], units: Sequence[str]) -> tuple[list[float], str]:
-    """Return lengths along x, y and z in the unit of the first, where all are of length."""
-    metres = [METRES.get(unit, 0.0) for unit in units]
-    if len({*units}) == 1 or not all(metres):
-        return [*lengths], one_unit(units)
-    return [n * m / metres[0] for n, m in zip(lengths, metres, strict=True)], units[0]
-
-
-def one_unit(units: Sequence[str]) -> str:
-    """Return the unit of lengths along x, y and z: of each, where they differ."""
-    return units[0] if len({*units}) == 1 else ", ".join(unit or "1" for unit in units)
+def one_unit(units: Sequence[Any]) -> str:
+    """Return the unit of lengths along all axes; UnsupportedError if they differ."""
+    if len({*units}) > 1:
+        raise UnsupportedError(
+            f"it has lengths in {', '.join(map(str, units))} along its axes: write them in one unit"
+        )
+    return str(units[0] or "")

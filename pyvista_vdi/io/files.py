@@ -8,21 +8,17 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.io.volumes.formats import FORMATS
+from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, check_writable, with_suffix
 from pyvista_vdi.registry import FileFormat
-
-#: What reads and writes a VDI in its VTK form, as any image of VTK's.
-_FROM_VTK = "pyvista_vdi.vtk_pipeline.vdi_from_image(pyvista.read(path))"
-_TO_VTK = "pyvista.wrap(pyvista_vdi.vtk_pipeline.vdi_to_image(vdi)).save(path)"
 
 
 def suffixes() -> tuple[str, ...]:
@@ -96,12 +92,6 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
     See :func:`pyvista_vdi.read`, which has the options and the errors.
     """
     found = format_of(path) or _own()
-    of_volumes = tuple(suffix for each in FORMATS.values() for suffix in each.suffixes)
-    if format_named(path) is None and str(path).lower().endswith(of_volumes):
-        others = "pyvista_vdi.read_volume reads volumes"
-        if str(path).lower().endswith(".vti"):
-            others += f", and {_FROM_VTK} a VDI in its VTK form"
-        raise VDIFileError(f"{path} is no VDI by its name: {others}")
     _check_names("read", path, options, found.read_options)
     return found.load().read(path, progress=progress, **options)
 
@@ -132,8 +122,6 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
     :func:`suffixes`, or it cannot be written; MissingDependencyError if what writes it is missing.
     """
     target = as_path(path)
-    if target.suffix.lower() == ".vti":
-        raise VDIFileError(f"{target}: VTK writes its own files, {_TO_VTK}; name a .vdi file here")
     named = format_named(with_suffix(target, suffixes(), "a VDI"))
     if named is not None:
         named.load()  # what it needs is missed now
@@ -147,11 +135,8 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
     of_compressed = ("compression", "level") if compressions else ()
     _check_names("written", path, options, (*of_compressed, *found.write_options))
     compression = options.get("compression", next(iter(compressions), None))
-    if compressions and not (isinstance(compression, str) and compression in compressions):
-        known = f"one of {', '.join(compressions[:-1])} and " if compressions[1:] else ""
-        raise InvalidArgumentError(
-            f"compression of {path} must be {known}{compressions[-1]}; got {compression!r}"
-        )
+    if compressions:
+        one_of(compression, f"compression of {path}", compressions)
     check_level(options.get("level"))
     if options.get("precision") is not None:
         check_precision(options["precision"])

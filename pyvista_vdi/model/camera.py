@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -43,13 +45,7 @@ def check_window_size(window_size: Sequence[int], *, name: str = "window_size") 
     return size
 
 
-#: What a camera is made of and described by.
-_STATE = (
-    *("focal_point", "model_transform", "parallel_projection", "parallel_scale", "position"),
-    *("use_horizontal_view_angle", "view_angle", "view_up", "window_center"),
-)
-
-
+@dataclass(frozen=True, init=False)
 class Camera:
     """A view, with VTK's names and meanings.
 
@@ -84,8 +80,6 @@ class Camera:
         parallel to the direction of projection, or ``model_transform`` cannot be inverted.
     """
 
-    __slots__ = ("_key", "_model_to_view", "axes", *_STATE)
-
     position: tuple[float, float, float]
     focal_point: tuple[float, float, float]
     view_up: tuple[float, float, float]
@@ -94,9 +88,8 @@ class Camera:
     parallel_scale: float
     window_center: tuple[float, float]
     use_horizontal_view_angle: bool
-    model_transform: Matrix
-    #: Unit vectors right, up and forward in world coordinates, float64 (3, 3), as rows.
-    axes: Matrix
+    model_transform: Matrix = field(compare=False, repr=False)
+    _transform: bytes = field(init=False, repr=False)
 
     def __init__(
         self,
@@ -111,27 +104,19 @@ class Camera:
         use_horizontal_view_angle: bool = False,
         model_transform: ArrayLike | None = None,
     ) -> None:
-        checked = {
-            "focal_point": as_vector(focal_point, "focal_point", 3, InvalidCameraError),
-            "model_transform": _affine(model_transform),
-            "parallel_projection": as_flag(parallel_projection, "parallel_projection"),
-            "parallel_scale": as_float(parallel_scale),
-            "position": as_vector(position, "position", 3, InvalidCameraError),
-            "use_horizontal_view_angle": as_flag(
-                use_horizontal_view_angle, "use_horizontal_view_angle"
-            ),
-            "view_angle": as_float(view_angle),
-            "view_up": as_vector(view_up, "view_up", 3, InvalidCameraError),
-            "window_center": as_vector(window_center, "window_center", 2, InvalidCameraError),
-        }
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
-        checked["model_transform"] = self.model_transform.tobytes()
-        object.__setattr__(self, "_key", tuple(checked.values()))
-        object.__setattr__(self, "axes", self._checked_axes())
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"a Camera cannot be changed (tried to set {name!r}): use replace()")
+        put = object.__setattr__
+        put(self, "position", as_vector(position, "position", 3, InvalidCameraError))
+        put(self, "focal_point", as_vector(focal_point, "focal_point", 3, InvalidCameraError))
+        put(self, "view_up", as_vector(view_up, "view_up", 3, InvalidCameraError))
+        put(self, "view_angle", as_float(view_angle))
+        put(self, "parallel_projection", as_flag(parallel_projection, "parallel_projection"))
+        put(self, "parallel_scale", as_float(parallel_scale))
+        put(self, "window_center", as_vector(window_center, "window_center", 2, InvalidCameraError))
+        horizontal = as_flag(use_horizontal_view_angle, "use_horizontal_view_angle")
+        put(self, "use_horizontal_view_angle", horizontal)
+        put(self, "model_transform", _affine(model_transform))
+        put(self, "_transform", self.model_transform.tobytes())
+        _ = self.axes  # which refuses what makes no view
 
     @classmethod
     def from_any(cls, camera: Any, *, model_transform: ArrayLike | None = None) -> Camera:
@@ -208,17 +193,15 @@ class Camera:
             raise InvalidCameraError(
                 f"a camera's description is a dictionary; got {type(state).__name__}"
             )
-        unknown = sorted(set(state) - set(_STATE))
-        missing = sorted({"position", "focal_point", "view_up"} - set(state))
-        if unknown or missing:
-            raise InvalidCameraError(
-                f"a camera's description has unknown entries {unknown}, lacks {missing}"
-            )
-        return cls(**state)
+        try:
+            return cls(**state)
+        except TypeError as error:  # an entry is missing, or unknown
+            raise InvalidCameraError(f"this is no camera's description: {error}") from error
 
     def to_dict(self) -> dict[str, Any]:
         """Return all arguments of the constructor, as plain numbers and lists (for JSON)."""
-        return {name: np.asarray(getattr(self, name)).tolist() for name in _STATE}
+        names = sorted(each.name for each in fields(self) if each.init)
+        return {name: np.asarray(getattr(self, name)).tolist() for name in names}
 
     def to_pyvista(self) -> Any:
         """Return the view of the model frame as a PyVista camera: ``plotter.camera = ...``.
@@ -249,9 +232,7 @@ class Camera:
 
     def replace(self, **changes: Any) -> Camera:
         """Return a copy with some arguments of the constructor changed."""
-        if unknown := sorted(set(changes) - set(_STATE)):
-            raise InvalidCameraError(f"a Camera has no {', '.join(unknown)}")
-        return Camera(**{name: getattr(self, name) for name in _STATE} | changes)
+        return replace(self, **changes)
 
     def azimuth(self, degrees: float) -> Camera:
         """Return the view turned about ``view_up`` through the focal point (as VTK's Azimuth)."""
@@ -315,6 +296,51 @@ class Camera:
             window_center=around * window / tile,
         )
 
+    @cached_property
+    def axes(self) -> Matrix:
+        """Unit vectors right, up and forward in world coordinates, float64 (3, 3), as rows."""
+        # In parallel projection the angle has no meaning, but it is a number
+        any_angle = self.parallel_projection and math.isfinite(self.view_angle)
+        if not (any_angle or 0 < self.view_angle < 180):
+            raise InvalidCameraError(
+                f"view_angle must lie between 0 and 180 degrees, both excluded; "
+                f"got {self.view_angle!r}"
+            )
+        if not (math.isfinite(self.parallel_scale) and self.parallel_scale > 0):
+            raise InvalidCameraError(
+                f"parallel_scale must be a positive number of world units; "
+                f"got {self.parallel_scale!r}"
+            )
+        with np.errstate(over="ignore"):
+            forward = np.subtract(self.focal_point, self.position)
+        if not np.isfinite(forward).all():
+            raise InvalidCameraError(
+                f"the camera's position {self.position} and focal point {self.focal_point} are "
+                "too far apart for float64: move them closer"
+            )
+        if not np.any(forward):
+            raise InvalidCameraError(
+                f"the camera's position and focal point are the same point {self.position}: "
+                "move one of them"
+            )
+        if not np.any(self.view_up):
+            raise InvalidCameraError("view_up is the zero vector: give the direction that is up")
+        # sin of the angle between them; below 1e-12 float64 cannot tell which way is right
+        across = _cross(_unit(forward), _unit(np.asarray(self.view_up)))
+        if math.sqrt(across @ across) < 1e-12:
+            raise InvalidCameraError(
+                f"view_up {self.view_up} is parallel to the direction of projection "
+                f"{tuple(_unit(forward).tolist())}: choose another up direction"
+            )
+        # By a power of two, which rounds nothing: squares may overflow
+        forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
+        forward = forward / math.sqrt(forward @ forward)
+        right = _cross(forward, _unit(np.asarray(self.view_up)))
+        right /= math.sqrt(right @ right)
+        axes = np.array([right, _cross(right, forward), forward])
+        axes.setflags(write=False)
+        return axes
+
     @property
     def view_matrix(self) -> Matrix:
         """World to view space (X right, Y up, Z forward, world units), float64 (4, 4)."""
@@ -322,22 +348,18 @@ class Camera:
         shift = -axes @ np.asarray(self.position)
         return np.vstack([np.column_stack([axes, shift]), [0, 0, 0, 1]])
 
-    @property
+    @cached_property
     def model_to_view(self) -> Matrix:
         """Model frame to view space, float64 (4, 4), read-only.
 
         The eye is subtracted before the rotation, so that an origin far from zero costs no digits
         beyond those of the coordinates themselves.
         """
-        known: Matrix | None = getattr(self, "_model_to_view", None)
-        if known is None:
-            axes = self.axes
-            known = np.eye(4)
-            known[:3, :3] = axes @ self.model_transform[:3, :3]
-            known[:3, 3] = axes @ (self.model_transform[:3, 3] - np.asarray(self.position))
-            known.setflags(write=False)
-            object.__setattr__(self, "_model_to_view", known)
-        return known
+        axes, matrix = self.axes, np.eye(4)
+        matrix[:3, :3] = axes @ self.model_transform[:3, :3]
+        matrix[:3, 3] = axes @ (self.model_transform[:3, 3] - np.asarray(self.position))
+        matrix.setflags(write=False)
+        return matrix
 
     def half_extent(self, window_size: Sequence[int]) -> tuple[float, float]:
         """Return half the viewport's width and height.
@@ -405,68 +427,6 @@ class Camera:
         if self.parallel_projection:
             return slope, forward
         return np.zeros((3, 3)), slope + forward
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Camera) and self._key == other._key  # type: ignore[attr-defined]
-
-    def __hash__(self) -> int:
-        return hash(self._key)  # type: ignore[attr-defined]
-
-    def __reduce__(self) -> Any:
-        return (Camera.from_dict, (self.to_dict(),))
-
-    def __repr__(self) -> str:
-        lens = f"view_angle={self.view_angle:g}"
-        if self.parallel_projection:
-            lens = f"parallel_projection=True, parallel_scale={self.parallel_scale:g}"
-        return (
-            f"Camera(position={self.position}, focal_point={self.focal_point}, "
-            f"view_up={self.view_up}, {lens})"
-        )
-
-    def _checked_axes(self) -> Matrix:
-        """Return the axes of a lens, an eye and a direction that make a view."""
-        # In parallel projection the angle has no meaning, but it is a number
-        any_angle = self.parallel_projection and math.isfinite(self.view_angle)
-        if not (any_angle or 0 < self.view_angle < 180):
-            raise InvalidCameraError(
-                f"view_angle must lie between 0 and 180 degrees, both excluded; "
-                f"got {self.view_angle!r}"
-            )
-        if not (math.isfinite(self.parallel_scale) and self.parallel_scale > 0):
-            raise InvalidCameraError(
-                f"parallel_scale must be a positive number of world units; "
-                f"got {self.parallel_scale!r}"
-            )
-        with np.errstate(over="ignore"):
-            forward = np.subtract(self.focal_point, self.position)
-        if not np.isfinite(forward).all():
-            raise InvalidCameraError(
-                f"the camera's position {self.position} and focal point {self.focal_point} are "
-                "too far apart for float64: move them closer"
-            )
-        if not np.any(forward):
-            raise InvalidCameraError(
-                f"the camera's position and focal point are the same point {self.position}: "
-                "move one of them"
-            )
-        if not np.any(self.view_up):
-            raise InvalidCameraError("view_up is the zero vector: give the direction that is up")
-        # sin of the angle between them; below 1e-12 float64 cannot tell which way is right
-        across = _cross(_unit(forward), _unit(np.asarray(self.view_up)))
-        if math.sqrt(across @ across) < 1e-12:
-            raise InvalidCameraError(
-                f"view_up {self.view_up} is parallel to the direction of projection "
-                f"{tuple(_unit(forward).tolist())}: choose another up direction"
-            )
-        # By a power of two, which rounds nothing: squares may overflow
-        forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
-        forward = forward / math.sqrt(forward @ forward)
-        right = _cross(forward, _unit(np.asarray(self.view_up)))
-        right /= math.sqrt(right @ right)
-        axes = np.array([right, _cross(right, forward), forward])
-        axes.setflags(write=False)
-        return axes
 
     def _turned(self, axis: Matrix, degrees: float) -> Camera:
         """Rotate the eye about ``axis`` through the focal point (Rodrigues' formula)."""

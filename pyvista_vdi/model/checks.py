@@ -99,7 +99,7 @@ def one_of(value: Any, name: str, names: Sequence[str], none: bool = False) -> A
     near = difflib.get_close_matches(value, names, n=1) if isinstance(value, str) else ()
     hint = f": did you mean {near[0]!r}?" if near else ""
     known = f"one of {', '.join(names[:-1])} and {names[-1]}"
-    if len(names) == 2:
+    if len(names) < 3:
         known = " or ".join(map(repr, names))
     raise error(f"{name} must be {known}; got {value!r}{hint}")
 

@@ -9,19 +9,13 @@ import itertools
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, VDIError
-from pyvista_vdi.model.store_identity import (
-    Digests,
-    by_absolute_path,
-    digests_of,
-    local_files,
-    state_of,
-)
 
 #: Chunks of arrays that have none.
 _CHUNK_POINTS = 64
@@ -50,7 +44,7 @@ class ChunkedArray:
         checked: Callable[[NDArray[Any]], NDArray[Any]] | None = None,
         dtype: Any = None,
     ) -> None:
-        source = by_absolute_path(source)
+        source = _by_absolute_path(source)
         library = type(source).__module__.partition(".")[0]
         self.lazy = source if library == "dask" else None
         self._array = source
@@ -67,7 +61,7 @@ class ChunkedArray:
                 )
             raise InvalidVolumeError(
                 f"a volume is a three-dimensional array; got shape {tuple(source.shape)}: choose "
-                "time and channel (pyvista_vdi.open_volume does), or index the array"
+                "time and channel (pyvista_vdi.read_volume does), or index the array"
             )
         if any(math.isnan(n) for n in self._array.shape):
             raise InvalidVolumeError(
@@ -86,12 +80,6 @@ class ChunkedArray:
             self.lazy = self._array = self.lazy.map_blocks(
                 _held, checked, self.dtype, dtype=self.dtype
             )
-        self._watch()
-
-    def _watch(self) -> None:
-        """Remember the files of the array as they are now: they must stay so."""
-        self._files = local_files(self._array)
-        self._before = None if self._files is None else state_of(self._array, self._files)
 
     def _chunks(self, kept: Sequence[int]) -> tuple[int, int, int]:
         chunks: Any = getattr(self._array, "chunks", None) or (_CHUNK_POINTS,) * len(self._index)
@@ -120,7 +108,6 @@ class ChunkedArray:
                 f"{self.source} is read by three slices of step 1 (z, y, x); got {box!r}: "
                 "load the volume (volume.load()) for anything else"
             )
-        self._require_unchanged()
         parts = iter(box)
         at = tuple(next(parts) if isinstance(k, slice) else k for k in self._index)
         try:
@@ -159,9 +146,12 @@ class ChunkedArray:
             "block by block; volume.load() reads it whole"
         )
 
-    def digests(self) -> Digests:
-        """Return what tells the array's files from others, empty where it is in none here."""
-        return digests_of(self._array)
+    @property
+    def files(self) -> list[Path]:
+        """The files or folders that it is read from, those of a Dask graph's arrays among them."""
+        layers = getattr(getattr(self.lazy, "dask", None), "layers", {}).values()
+        arrays = [value for layer in layers if len(layer) == 1 for value in layer.values()]
+        return [path for each in (self._array, *arrays) if (path := _file_of(each)) is not None]
 
     @functools.cached_property
     def ends(self) -> tuple[float, float]:
@@ -175,26 +165,36 @@ class ChunkedArray:
             high.append(np.fmax.reduce(part, axis=None))
         return float(np.fmin.reduce(low)), float(np.fmax.reduce(high))
 
-    def _require_unchanged(self) -> None:
-        if self._files is None or state_of(self._array, self._files) == self._before:
-            return
-        if getattr(self._array, "id", None):
-            # While it is open, HDF5 gives whoever opens it again what it has in memory of it
-            self._array.file.close()
-        raise InvalidVolumeError(
-            f"{self._files} was closed, removed or written anew since it was opened: open it again"
-        )
-
     def __getstate__(self) -> dict[str, Any]:
         """Leave an open HDF5 file behind: it is opened where this is unpickled."""
         return {**self.__dict__, "_array": closed(self._array)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, _array=opened(state["_array"]))
-        self._watch()
 
     def __repr__(self) -> str:
         return f"ChunkedArray({self.source}, {self.shape} {self.dtype}, chunks={self.chunks})"
+
+
+def _file_of(array: Any) -> Path | None:
+    """Return an array's file, or its folder, if it is in any here."""
+    library = type(array).__module__.partition(".")[0]
+    if library == "h5py":
+        return Path(array.file.filename).absolute()
+    # A local store has its folder as `root` in zarr 3, and as `path` in zarr 2 and by fsspec
+    store = getattr(array, "store", None)
+    root = Path(str(getattr(store, "root", None) or getattr(store, "path", None)))
+    return root / array.path if library == "zarr" and root.is_dir() else None
+
+
+def _by_absolute_path(array: Any) -> Any:
+    """Return an array of zarr whose folder has a relative path as one that has an absolute path."""
+    path = _file_of(array)
+    if path is None or path.is_absolute():
+        return array
+    import zarr
+
+    return zarr.open_array(os.path.abspath(path), mode="r")  # noqa: PTH100 - no links
 
 
 class _InFile:

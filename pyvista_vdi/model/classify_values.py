@@ -173,19 +173,17 @@ def _warn_outside(deferred: DeferredVDI, transfer_function: TransferFunction) ->
     if len(values) < 2:
         return
     opacity = looked_up(transfer_function, values)[1] * np.gradient(values)
-    kept, what, remedy = (values >= low) & (values <= high), f"outside {low:g} to {high:g}", ""
-    if deferred.importance is not None and (opacity[kept] > 0).any():
+    kept = (values >= low) & (values <= high)
+    if deferred.importance is not None:
         points, weights = np.transpose(deferred.importance)
-        weighed = np.interp(values, points, weights) > 0
-        if not weighed[kept & (opacity > 0)].all():
-            what, remedy = f"{what}, or of importance 0", " and an importance above 0 there"
-            kept &= weighed
+        kept &= np.interp(values, points, weights) > 0
     outside = opacity[~kept].sum()
     if outside > 1e-3 * opacity.sum():
         warn_external(
-            f"the transfer function shows values {what}, which this VDI does not keep: "
-            f"{outside / opacity.sum():.1%} of its opacity from {least:g} to {largest:g}; generate "
-            f"with a wider value_range{remedy}, or lower the opacity there"
+            f"the transfer function shows values outside {low:g} to {high:g}, or of importance 0, "
+            f"which this VDI does not keep: {outside / opacity.sum():.1%} of its opacity from "
+            f"{least:g} to {largest:g}; generate with a wider value_range, or lower the opacity "
+            "there"
         )
 
 

@@ -88,8 +88,8 @@ class VDICollection(Sequence[VDI]):
         **options
             ``precision`` (by default a series' first step's, and else ``"8-byte"``),
             ``compression`` (``"zstd"``, and ``"deflate"`` in a page) and ``level`` as for
-            :meth:`VDI.save`; ``progress``, called with the finished fraction. For pages ``title``,
-            ``background`` and ``controls`` as well, and of a series ``autoplay``.
+            :meth:`VDI.save`; ``progress``, called with the finished fraction. For pages ``title``
+            and ``background`` as well, and of a series ``autoplay``.
 
         Returns
         -------

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.checks import as_float, as_floats, as_whole
+from pyvista_vdi.model.checks import as_floats, as_whole
 
 #: Names of VTK's sets of regions, and their flags (VTK_CROP_SUBVOLUME ...).
 PRESETS = {
@@ -180,20 +180,6 @@ class Cropping:
         borders = np.stack([box[:, 0], low, high, box[:, 1]], axis=1)
         kept = np.stack([borders[range(3), ends[:, 0]], borders[range(3), ends[:, 1] + 1]], axis=1)
         return cuts, kept
-
-
-def checked_opacity_multiplier(multiplier: Any) -> float:
-    """Return a factor of the extinction as a float, 0 or above.
-
-    Raises InvalidArgumentError if it is no finite number, or below 0.
-    """
-    factor = as_float(multiplier)
-    if not 0 <= factor < np.inf:
-        raise InvalidArgumentError(
-            "opacity_multiplier is a finite factor of the extinction, 0 (transparent) or above, "
-            f"1 for what was generated; got {multiplier!r}"
-        )
-    return factor
 
 
 def _of_image(planes: Sequence[float], image: Any) -> tuple[Any, Any]:

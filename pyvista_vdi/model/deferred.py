@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
-from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_floats, as_number, as_range
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI, Lists, lengths_of, with_arrays
@@ -27,32 +26,27 @@ class DeferredVDI(Lists):
     volume. Lists, depths and bounds are those of a :class:`VDI`. It is valid or cannot be built,
     and its arrays are read-only.
 
+    Made by :func:`pyvista_vdi.generate` with ``classification="deferred"``, and read from files.
+
     Parameters
     ----------
-    camera, window_size, offsets, front, back, bounds
-        As for :class:`VDI`.
-    mean : array_like of float32, shape (n,)
-        Mean by length of the values, as shares of ``value_range``, 0 to 1.
-    spread : array_like of float32, shape (n,)
-        Their standard deviation by length, as a share of ``value_range``, 0 to 1/2.
-    share : array_like of float32, shape (n,)
-        Share of the length that holds values of the range, 0 to 1: below 1 where a gap had to be
-        covered to keep the list's budget.
-    value_range : (float, float)
-        Least and largest value that it keeps; what is outside is in no supersegment.
-    unit_distance : float
-        Opacity unit distance of a transfer function that has none of its own, model units.
-    sample_distance : float
-        Step of the march that made it, model units, by whose opacity values are averaged.
-    importance : sequence of (float, float), optional
-        Points (value, weight) of the importance by which supersegments were cut; 1 by default.
-    depth_origin, metadata
-        As for :class:`VDI`.
+    lists : VDI
+        Its lists. In the place of colours are the mean by length of the values, as a share of
+        ``value_range``, what of it is left below its float32 or byte, and the share of the length
+        that holds values of the range, which is below 1 where a gap had to be covered to keep the
+        list's budget. In the place of the optical depth is the standard deviation by length, as a
+        share of ``value_range``, 0 to 1/2.
+    about : mapping
+        ``value_range``, the least and the largest value that it keeps; ``unit_distance``, the
+        opacity unit distance of a transfer function that has none of its own, and
+        ``sample_distance``, the step of the march that made it, by whose opacity values are
+        averaged, model units; ``importance``, points (value, weight) by which supersegments were
+        cut, 1 everywhere by default; ``version``, 1.
 
     Raises
     ------
     InvalidVDIError
-        If an element breaks a rule; the message names the element and the rule.
+        If something breaks a rule; the message names it and the rule.
     """
 
     value_range: tuple[float, float]
@@ -60,65 +54,9 @@ class DeferredVDI(Lists):
     sample_distance: float
     importance: tuple[tuple[float, float], ...] | None
 
-    def __init__(
-        self,
-        camera: Camera,
-        window_size: Sequence[int],
-        offsets: ArrayLike,
-        front: ArrayLike,
-        back: ArrayLike,
-        mean: ArrayLike,
-        spread: ArrayLike,
-        share: ArrayLike,
-        bounds: ArrayLike,
-        *,
-        value_range: Sequence[float],
-        unit_distance: float,
-        sample_distance: float,
-        importance: Sequence[Sequence[float]] | None = None,
-        depth_origin: float = 0.0,
-        metadata: Mapping[str, Any] | None = None,
-    ) -> None:
-        columns = [as_floats(values).astype(np.float32) for values in (mean, spread, share)]
-        names = ("mean", "spread", "share")
-        for name, values, most in zip(names, columns, (1.0, 0.5, 1.0), strict=True):
-            good = (values >= 0) & (values <= most)
-            if values.ndim != 1 or len(values) != len(columns[0]):
-                raise InvalidVDIError(
-                    f"{name} must have one number for each of {len(columns[0])} supersegments; "
-                    f"got shape {values.shape}"
-                )
-            if not good.all():
-                k = int(np.argmin(good))
-                raise InvalidVDIError(
-                    f"supersegment {k} breaks the rule '0 <= {name} <= {most:g}': {values[k]}"
-                )
-        # Mean, what of it is left below its float32, and share in the place of a colour; spread in
-        # that of the optical depth: whatever checks, packs, compresses and reads lists does it here
-        color = np.stack([columns[0], np.zeros_like(columns[0]), columns[2]], axis=1)
-        lists = VDI(
-            camera,
-            window_size,
-            offsets,
-            front,
-            back,
-            color,
-            columns[1],
-            bounds,
-            depth_origin=depth_origin,
-            metadata=metadata,
-        )
-        self._set(lists, value_range, unit_distance, sample_distance, importance)
-
-    @classmethod
-    def of_lists(cls, lists: VDI, about: Mapping[str, Any]) -> DeferredVDI:
-        """Return what was stored as :attr:`lists` and :attr:`about`; InvalidVDIError if it is none.
-
-        Generation and our files call it: ``about`` may be anybody's.
-        """
-        deferred = cls.__new__(cls)
-        if not isinstance(about, Mapping) or about.get("version") != 1:
-            version = about.get("version") if isinstance(about, Mapping) else about
+    def __init__(self, lists: VDI, about: Mapping[str, Any]) -> None:
+        version = about.get("version") if isinstance(about, Mapping) else about
+        if version != 1:
             raise InvalidVDIError(
                 f"its values are of version {version!r}, and this program reads version 1: "
                 "upgrade by pip install -U pyvista-vdi"
@@ -128,32 +66,24 @@ class DeferredVDI(Lists):
             raise InvalidVDIError(
                 f"supersegment {k} breaks the rule '0 <= spread <= 0.5': {lists.optical_depth[k]}"
             )
-        names = ("value_range", "unit_distance", "sample_distance", "importance")
-        deferred._set(lists, *(about.get(name) for name in names))
-        return deferred
-
-    def _set(self, lists: VDI, value_range: Any, unit: Any, step: Any, importance: Any) -> None:
-        self._lists, self.camera, self.window_size = lists, lists.camera, lists.window_size
-        self.bounds, self.depth_origin, self.metadata = (
-            lists.bounds,
-            lists.depth_origin,
-            lists.metadata,
-        )
-        low, high = as_range(value_range)
+        ends = about.get("value_range")
+        low, high = self.value_range = as_range(ends)
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise InvalidVDIError(
-                f"value_range must be two finite numbers, low < high; got {value_range!r}"
+                f"value_range must be two finite numbers, low < high; got {ends!r}"
             )
-        self.value_range = (low, high)
-        for name, value in (("unit_distance", unit), ("sample_distance", step)):
-            length = as_number(value)
-            if not (np.isfinite(length) and length > 0):
-                raise InvalidVDIError(f"{name} must be a length above 0; got {value!r}")
+        for name in ("unit_distance", "sample_distance"):
+            length = as_number(about.get(name))
+            if not 0 < length < np.inf:
+                raise InvalidVDIError(f"{name} must be a length above 0; got {about.get(name)!r}")
             setattr(self, name, length)
         try:
-            self.importance = importance_points(importance, self.value_range)
+            self.importance = importance_points(about.get("importance"), self.value_range)
         except InvalidArgumentError as error:
             raise InvalidVDIError(str(error)) from error
+        for name in ("camera", "window_size", "bounds", "depth_origin", "metadata"):
+            setattr(self, name, getattr(lists, name))
+        self._lists = lists
         lists.kept = self.about
 
     @property
@@ -239,7 +169,7 @@ class DeferredVDI(Lists):
             spread = np.ldexp(np.round(fraction * 16) / 16, exponent)
         color = np.stack([mean, low, self.share], axis=1).astype(np.float32)
         plain = with_arrays(lists, lists.arrays._replace(color=color, optical_depth=spread))
-        return DeferredVDI.of_lists(plain.with_precision(precision), self.about)
+        return DeferredVDI(plain.with_precision(precision), self.about)
 
     def classified(self, **look: Any) -> VDI:
         """Return the VDI that a transfer function makes of it, without the volume.

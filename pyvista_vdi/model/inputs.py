@@ -2,6 +2,7 @@
 
 import functools
 import os
+import reprlib
 import weakref
 from collections.abc import Iterable
 from typing import Any
@@ -70,33 +71,12 @@ def _kept_volume(image: Any, scalars: str | None, preference: str) -> Volume:
 
 
 def _with_scalars(volume: Volume, scalars: Any) -> Volume:
-    if scalars is None or isinstance(scalars, str):
-        if scalars not in (None, volume.name):
-            raise InvalidVolumeError(
-                f"the volume has no array {scalars!r}: its only one is {volume.name!r}"
-            )
-        return volume
-    try:
-        values = np.asarray(scalars)
-    except ValueError:  # lists of different lengths
-        values = np.empty(0)
-    rgba = values.ndim > 1 and values.shape[-1] == 4 and values.dtype == np.uint8
-    points = volume.scalars.size
-    if values.size != points * (4 if rgba else 1):
+    if scalars is not None and not (isinstance(scalars, str) and scalars == volume.name):
         raise InvalidVolumeError(
-            f"scalars must have one value per point, {points}; got {values.size}"
+            f"the volume has no array {reprlib.repr(scalars)}: its only one is {volume.name!r}; of "
+            "other values make another, pyvista_vdi.Volume(array, spacing, origin)"
         )
-    shaped = values.reshape(volume.scalars.shape + (4,) * rgba)
-    other = Volume(
-        shaped,
-        volume.spacing,
-        volume.origin,
-        volume.direction,
-        name="scalars",
-        blanked=volume.blanked,
-    )
-    other.unit_distance = volume.unit_distance
-    return other
+    return volume
 
 
 def as_vdi(vdi: Any) -> VDI:

@@ -38,39 +38,28 @@ def nearest_depth(grid: Geometry, camera: Camera, window_size: Sequence[int]) ->
     return max(0.0, float((corners @ to_view[2, :3] + to_view[2, 3]).min()))
 
 
-def required_level(
-    levels: Sequence[Geometry], camera: Camera, window_size: Sequence[int], unit: str = ""
-) -> tuple[int, str]:
-    """Return the level that a view requires, and why.
+def required_level(levels: Sequence[Geometry], camera: Camera, window_size: Sequence[int]) -> int:
+    """Return the level that a view requires.
 
     It is the coarsest whose voxels are still as fine as half a list's width where the volume is
     nearest to V_O: between the lists, what a finer one has more is hardly seen. Edges of voxels
     count along the axes in which a level is coarser: many stores keep their few planes in all.
 
     ``levels``: from the finest to the coarsest. ``camera``: V_O. ``window_size``: lists of V_O
-    along x and y. ``unit``: what lengths are called. Returns: Its number, and a sentence.
+    along x and y.
     """
     depth = nearest_depth(levels[0], camera, window_size)
-    if depth is None:
-        return len(levels) - 1, "the coarsest, as V_O sees nothing of the volume"
+    if depth is None:  # V_O sees nothing of the volume
+        return len(levels) - 1
     size = np.asarray(check_window_size(window_size))
     width = float((2 * np.asarray(camera.half_extent(window_size)) / size).min())
     width *= 1.0 if camera.parallel_projection else depth
-    if width == 0:
-        return 0, "the finest, as V_O is in the volume"
     to_view = camera.model_to_view[:3, :3]
     # Distances of neighbouring points along x, y and z, world units
     edges = [np.linalg.norm(to_view @ each.index_to_model[:3, :3], axis=0) for each in levels]
-    unit = unit and f" {unit}"
-    said = [" x ".join(f"{edge:.3g}" for edge in of_level) + unit for of_level in edges]
-    half = f"half a list's width, {width / 2:.3g}{unit} where the volume is nearest to V_O"
     chosen = 0
     for k, now in enumerate(edges):
         if now[now > _COARSER * edges[0]].max(initial=0) > width / 2:
             break
         chosen = k
-    coarser = f"they are no coarser than {half}"
-    if chosen + 1 < len(levels):
-        coarser = f"those of level {chosen + 1}, {said[chosen + 1]}, are coarser than {half}"
-    name = "the finest, " if chosen == 0 else "the coarsest, " if chosen + 1 == len(levels) else ""
-    return chosen, f"{name}voxels of {said[chosen]}: {coarser}"
+    return chosen

@@ -1,4 +1,4 @@
-"""How far one image is from another: SSIM, PSNR, worst pixel, brightness; and edges along lists.
+"""How far one image is from another: SSIM, PSNR, worst pixel, brightness.
 
 A figure means the same everywhere: RGB over a background, clipped to 0..1, not quantised.
 """
@@ -8,32 +8,25 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_floats
 
 #: Arguments of ``skimage.metrics.structural_similarity``: Wang et al. 2004.
-SSIM_ARGUMENTS: MappingProxyType[str, Any] = MappingProxyType(
-    {
-        "data_range": 1.0,
-        "channel_axis": -1,
-        "gaussian_weights": True,
-        "sigma": 1.5,
-        "use_sample_covariance": False,
-    }
-)
+SSIM_ARGUMENTS: dict[str, Any] = {
+    "data_range": 1.0,
+    "channel_axis": -1,
+    "gaussian_weights": True,
+    "sigma": 1.5,
+    "use_sample_covariance": False,
+}
 
 #: Shortest edge of an image that has an SSIM, pixels: the window, 2 round(3.5 sigma) + 1.
 SSIM_WINDOW = 11
-
-#: Share of red, green and blue in luminance (Rec. 709).
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass(frozen=True)
@@ -162,91 +155,3 @@ def compare_images(
         worst_position=(int(column), int(row)),
         mean_brightness_ratio=mean / reference_mean if reference_mean else both_black,
     )
-
-
-@dataclass(frozen=True)
-class ListEdges:
-    """How much the error of a picture jumps from list to list: what :func:`list_edges` found.
-
-    ``across`` is the mean absolute step of the error's luminance between neighbouring pixels of two
-    lists, ``within`` that of neighbours in one list; NaN where no two share a list.
-    """
-
-    across: float
-    within: float
-
-    @property
-    def ratio(self) -> float:
-        """``across`` over ``within``: above 1 squares show; 0 where no two pixels share a list."""
-        if self.across == 0 or math.isnan(self.within):
-            return 0.0
-        return self.across / self.within if self.within > 0 else math.inf
-
-
-def list_edges(
-    image: ArrayLike,
-    reference: ArrayLike,
-    columns: ArrayLike,
-    rows: ArrayLike,
-    background: Sequence[float] = (0.0, 0.0, 0.0),
-) -> ListEdges:
-    """Measure the edges that a picture has along the borders of a VDI's lists.
-
-    Where a list covers several pixels, all of them show what its middle shows: squares, which SSIM
-    hardly notices and people do. The error, picture less reference, then jumps from list to list
-    and follows the reference within a list, so that the two kinds of steps tell squares from other
-    errors. On a ramp a list of n pixels has a ratio of n - 1.
-
-    ``image``, ``reference``, ``background``: as for :func:`compare_images`, both from the
-    generating view; ``columns``, ``rows``: where each column and each row of pixels lies among the
-    lists, see :func:`list_places`. InvalidArgumentError if their sizes differ.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from pyvista_vdi.model.metrics import list_edges
-    >>> ramp = np.linspace(0, 1, 16)[:, None, None] * np.ones((1, 16, 3))
-    >>> squares = ramp.reshape(4, 4, 16, 3).mean(axis=1).repeat(4, axis=0)
-    >>> lists_of_pixels = np.arange(16) // 4
-    >>> round(list_edges(squares, ramp, lists_of_pixels, lists_of_pixels).ratio, 6)
-    3.0
-    """
-    a, b = over_background(image, background), over_background(reference, background)
-    across, down = np.floor(columns), np.floor(rows)
-    if a.shape != b.shape or a.shape[:2] != (len(down), len(across)):
-        raise InvalidArgumentError(
-            f"the images and the lists of their pixels are of different sizes: {a.shape[:2]}, "
-            f"{b.shape[:2]}, and {len(down)} rows of {len(across)} pixels"
-        )
-    error = (a - b) @ _LUMINANCE
-    borders, others = [], []
-    for axis, lists in enumerate((down, across)):
-        steps = np.abs(np.diff(error, axis=axis))
-        border = np.diff(lists) != 0
-        borders.append(np.compress(border, steps, axis=axis).ravel())
-        others.append(np.compress(~border, steps, axis=axis).ravel())
-    on, off = np.concatenate(borders), np.concatenate(others)
-    return ListEdges(
-        float(on.mean()) if on.size else 0.0, float(off.mean()) if off.size else math.nan
-    )
-
-
-def list_places(
-    camera: Camera, window_size: Sequence[int], lists: Sequence[int]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return where the pixels of a picture from the generating view lie among its lists.
-
-    ``window_size`` and ``lists`` are pixels of the picture, and lists of the VDI, along each edge.
-    Returns columns and rows, float64 (W,) and (H,): a list's width or height is 1, 0 is the left or
-    the upper end of the first, so that ``floor`` numbers the lists. The picture may reach a little
-    beyond the first and the last: the window of the lists may not have its aspect to the last
-    digit.
-    """
-    size, count = check_window_size(window_size), check_window_size(lists)
-    seen, held = camera.half_extent(size), camera.half_extent(count)
-    centre = (camera.window_center[0], -camera.window_center[1])  # downwards, as rows go
-    columns, rows = (
-        (((2 * np.arange(pixels) + 1) / pixels - 1 + c) * extent / of_lists - c + 1) / 2 * n
-        for pixels, n, extent, of_lists, c in zip(size, count, seen, held, centre, strict=True)
-    )
-    return columns, rows

@@ -5,7 +5,6 @@ calibrated, as DICOM files are; MRI has no unit, and its points are shares of th
 """
 
 import difflib
-from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,10 +91,10 @@ def _arguments(look: _Look) -> dict[str, Any]:
     }
 
 
-class Presets(Mapping[str, dict[str, Any]]):
+class Presets(dict[str, dict[str, Any]]):
     """Arguments of ``add_vdi``, ``add_volume`` and :func:`pyvista_vdi.generate`, by name.
 
-    Each look is a new dictionary of ``cmap``, ``opacity``, ``clim``, ``n_colors`` and ``shade``;
+    Each look is a dictionary of ``cmap``, ``opacity``, ``clim``, ``n_colors`` and ``shade``;
     ``presets["ct-bone"] | {"shade": False}`` changes a part of it.
 
     Examples
@@ -105,22 +104,10 @@ class Presets(Mapping[str, dict[str, Any]]):
     (150.0, 1600.0)
     """
 
-    def __getitem__(self, name: str) -> dict[str, Any]:
-        try:
-            return _arguments(_LOOKS[name])
-        except (KeyError, TypeError):
-            near = difflib.get_close_matches(str(name), _LOOKS, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(_LOOKS)}"
-            raise InvalidArgumentError(f"no preset is called {name!r}: {hint}") from None
-
-    def __contains__(self, name: object) -> bool:
-        return isinstance(name, str) and name in _LOOKS
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(_LOOKS)
-
-    def __len__(self) -> int:
-        return len(_LOOKS)
+    def __missing__(self, name: object) -> Any:
+        near = difflib.get_close_matches(str(name), self, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(self)}"
+        raise InvalidArgumentError(f"no preset is called {name!r}: {hint}")
 
     def __repr__(self) -> str:
         width = max(map(len, _LOOKS))
@@ -134,4 +121,4 @@ class Presets(Mapping[str, dict[str, Any]]):
 
 
 #: The looks.
-presets = Presets()
+presets = Presets({name: _arguments(look) for name, look in _LOOKS.items()})

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import Number
-from pyvista_vdi.model.cropping import Cropping, checked_opacity_multiplier
+from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.options import Options, option, record
 from pyvista_vdi.model.types import Coverage, Draw, Policy
 
@@ -77,7 +77,7 @@ class SceneOptions(Options):
         1.0,
         "factor of the extinction, 0 or above",
         "2 is twice as dense, as by half of the opacity unit distance.",
-        check=checked_opacity_multiplier,
+        check=Number("a finite factor of the extinction, 0 (transparent) or above"),
     )
 
     def drawn(self) -> RenderOptions:
@@ -225,5 +225,6 @@ class DrawingOptions(Options):
 
 # Checks of VTK's setters of the same
 checked_bound: Any = DrawingOptions.declared["regenerate_below"].check
+checked_opacity_multiplier: Any = SceneOptions.declared["opacity_multiplier"].check
 checked_draw: Any = DrawingOptions.declared["draw"].check
 checked_transmittance_cutoff: Any = RenderOptions.declared["transmittance_cutoff"].check

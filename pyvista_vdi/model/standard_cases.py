@@ -6,7 +6,6 @@ tests, benchmarks) takes them from here.
 
 import math
 from collections.abc import Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,15 +16,11 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_bounds
 
 #: Transfer functions by name, as arguments of ``Plotter.add_volume``; the rest is default.
-TRANSFER_FUNCTIONS: MappingProxyType[str, MappingProxyType[str, Any]] = MappingProxyType(
-    {
-        "soft": MappingProxyType({"cmap": "bone", "opacity": "linear"}),
-        "steep": MappingProxyType({"cmap": "viridis", "opacity": "sigmoid_10"}),
-        "nearly-opaque": MappingProxyType(
-            {"cmap": "inferno", "opacity": (0.0, 0.0, 0.02, 0.9, 1.0)}
-        ),
-    }
-)
+TRANSFER_FUNCTIONS: dict[str, dict[str, Any]] = {
+    "soft": {"cmap": "bone", "opacity": "linear"},
+    "steep": {"cmap": "viridis", "opacity": "sigmoid_10"},
+    "nearly-opaque": {"cmap": "inferno", "opacity": (0.0, 0.0, 0.02, 0.9, 1.0)},
+}
 
 #: Angles from V_O at which a VDI is judged, degrees of ``Azimuth`` about the centre.
 ANGLES: tuple[float, ...] = (0.0, 5.0, 30.0)

@@ -7,7 +7,7 @@ import reprlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,15 +27,10 @@ Bounds = tuple[float, float, float, float, float, float]
 _LENS = ("view_angle", "use_horizontal_view_angle", "parallel_scale", "window_center")
 
 
-class LateArrays(Protocol):
-    """What arrays are made of when they are asked for.
-
-    Lists on the device that made them (``generation/list_arrays.py``), 8-byte supersegments
-    (``model/packing.py``), or values and a transfer function (``model/classify_values.py``).
-    """
-
-    def arrays(self) -> Arrays:
-        """Return the arrays, valid."""
+#: What has arrays that are made when they are asked for, by its ``arrays()``: lists on the device
+#: that made them (``generation/list_arrays.py``), 8-byte supersegments (``model/packing.py``), or
+#: values and a transfer function (``model/classify_values.py``).
+LateArrays = Any
 
 
 class Lists(ABC):
@@ -326,11 +321,6 @@ class VDI(Lists):
         >>> pvdi.read("brain.vdi").plot()  # doctest: +SKIP
         """
         return registry.method("VDI.plot")(self, **arguments)
-
-    def _repr_html_(self) -> str | None:
-        """Return a thumbnail and the figures, for what shows HTML and no viewer."""
-        form = registry.method("VDI._repr_html_", lambda vdi: None)
-        return form(self)  # type: ignore[no-any-return]
 
 
 def made_vdi(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,11 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
+from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
 from pyvista_vdi.model.checks import as_floats, as_vector
 from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
 from pyvista_vdi.model.host_memory import require_host_memory
-from pyvista_vdi.model.packed_values import packing_of
 
 
 class Geometry:
@@ -103,8 +101,10 @@ VOXEL_TYPES: tuple[str, ...] = (
     "float64",
 )
 
-#: Numbers that float64 must have from voxel to voxel, so that rounding is not seen.
-_PLACES_IN_A_STEP = 256
+#: Attributes by which arrays in files say that their values are others than those that are stored.
+_PACKING = ("scale_factor", "add_offset", "_Unsigned")
+#: Attributes with numbers that stand for nothing, and what xarray writes for NaN in zarr 3.
+_MISSING, _NAN = ("_FillValue", "missing_value"), "AAAAAAAA+H8="
 
 #: Types that one of those represents without loss for every value they can hold.
 _WIDENED = {"bool": "uint8", "float16": "float32"}
@@ -180,18 +180,6 @@ class Volume(Geometry):
             raise InvalidVolumeError(
                 f"spacing must be positive along each axis; got {self.spacing}: "
                 "flip the array (or the direction matrix) instead of a negative spacing"
-            )
-        # Warn where float64 rounds the places of voxels by more than pictures bear
-        farthest = np.abs(self.bounds).reshape(3, 2).max(axis=1)
-        rounded = np.abs(self.direction.T) @ [math.ulp(at) for at in farthest]  # along each axis
-        worst = int(np.argmax(rounded / self.spacing))
-        rounding, step = rounded[worst], self.spacing[worst]
-        if rounding * _PLACES_IN_A_STEP > step:
-            warn_external(
-                f"the volume {self.name!r} is {farthest.max():.3g} model units from the origin, "
-                f"where float64 places points to {rounding:.2g}, and its voxels are {step:.2g} "
-                "apart: pictures are off by that share of a voxel; move its origin, and the "
-                "camera with it, towards 0"
             )
 
     @staticmethod
@@ -322,16 +310,27 @@ def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any
     """Return an array that is read chunk by chunk, as a volume holds it; nothing is read yet.
 
     ``index`` says what is taken of an array of more dimensions, as of a :class:`ChunkedArray`.
-    Values that its attributes pack (``scale_factor``, ``add_offset``, ``_FillValue``) are unpacked.
+    Values that its attributes pack, as the CF conventions have it, are refused.
     """
     if isinstance(array, ChunkedArray):
         return array
-    packing: Any = packing_of(array)
-    kind, long = _voxel_type(array.dtype if packing is None else packing.dtype)
-    checked = _from_long_integers if long else packing
+    attributes = getattr(array, "attrs", {})
+    said = [name for name in _PACKING if name in attributes]
+    said += [name for name in _MISSING if name in attributes and not _is_nan(attributes[name])]
+    if said:
+        raise InvalidVolumeError(
+            f"the array's values are packed ({', '.join(said)}): open it by xarray, which unpacks "
+            'them, and give pyvista_vdi.Volume(dataset["name"].data)'
+        )
+    kind, long = _voxel_type(array.dtype)
+    checked = _from_long_integers if long else None
     found = ChunkedArray(array, index=index, checked=checked, dtype=kind)
     _check_planes(found.shape)
     return found
+
+
+def _is_nan(said: Any) -> bool:
+    return said == _NAN if isinstance(said, str) else bool(np.isnan(as_floats(said)).all())
 
 
 def _check_planes(shape: tuple[int, ...]) -> None:

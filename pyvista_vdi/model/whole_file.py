@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from pyvista_vdi.errors import InvalidArgumentTypeError, VDIFileError, with_article
+from pyvista_vdi.errors import InvalidArgumentTypeError, VDIFileError
 
 
 @contextlib.contextmanager
@@ -64,7 +64,7 @@ def as_path(path: Any) -> Path:
     """Return a path, or raise InvalidArgumentTypeError if it is none."""
     if not isinstance(path, str | os.PathLike):
         raise InvalidArgumentTypeError(
-            f"a path is a text or a pathlib.Path; got {with_article(type(path).__name__)}"
+            f"a path is a text or a pathlib.Path; got {type(path).__name__}"
         )
     return Path(path)
 

@@ -47,7 +47,7 @@ from pyvista_vdi.plotting.volumes import as_grid, held, load
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
 from pyvista_vdi.quality.targets import refuse_settings
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
-from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, LateValues
+from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import aim, as_array
 from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet
@@ -307,7 +307,7 @@ def _of_values(shown: DeferredVDI, asked: Addition) -> _Shown:
     """Return a deferred VDI with the property that classifies it."""
     asked.refuse_with_a_vdi({n: v for n, v in asked.look.given.items() if n == "interpolation"})
     title = str(shown.metadata.get("scalars") or "Data")
-    return _classified(shown, asked, shown.value_range, shown.unit_distance, title)
+    return _values_shown(shown, asked, shown.value_range, shown.unit_distance, title)
 
 
 def _of_late_values(volume: Any, asked: Addition) -> _Shown:
@@ -328,7 +328,7 @@ def _of_late_values(volume: Any, asked: Addition) -> _Shown:
     volume = source.GetVolume()
     ends, _ = kept_range(volume, asked.options, asked.deferral)
     plain = replace(asked, look=replace(asked.look, interpolation="nearest"))
-    return _classified(LateValues(source), plain, ends, volume.default_unit_distance, volume.name)
+    return _values_shown(source, plain, ends, volume.default_unit_distance, volume.name)
 
 
 def _refuse_of_values(look: Looks) -> None:
@@ -344,8 +344,8 @@ def _refuse_of_values(look: Looks) -> None:
             )
 
 
-def _classified(
-    values: DeferredVDI | LateValues,
+def _values_shown(
+    values: DeferredVDI | VDISource,
     asked: Addition,
     value_range: tuple[float, float],
     unit_distance: float,
@@ -395,7 +395,7 @@ def _source(volume: Any, asked: Addition) -> VDISource:
     source.SetInputDataObject(data)
     source.SetScalars(name, preference)
     source.SetOptions(asked.options)
-    source.SetTarget(asked.target)
+    source.SetDial(**asked.target.given)
     source.SetDevice(asked.making.device)
     source.SetProgressCallback(progress_callback(asked.making.progress_bar))
     if asked.making.camera is not None:

@@ -98,7 +98,7 @@ class Looks(Look):
 
     def _of_preset(self, name: str) -> Looks:
         """Return them with a preset's colours, and its range and opacity where none are given."""
-        look = presets[name]
+        look = dict(presets[name])
         if self.clim is not None:
             del look["clim"]
         if not (isinstance(self.opacity, str) and self.opacity == "linear"):

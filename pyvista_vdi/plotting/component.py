@@ -136,9 +136,7 @@ class PlotterVDIs(Component):
         super().__init__(plotter)
         self._editors: list[TransferFunctionEditor] = []
 
-    def export_html(
-        self, filename: str | os.PathLike[str] | None, *, controls: str = "all"
-    ) -> io.StringIO | None:
+    def export_html(self, filename: str | os.PathLike[str] | None) -> io.StringIO | None:
         """Write one HTML file that shows the plotter's scene, VDIs included, and turns it.
 
         It opens from disk, offline, in any browser with WebGL 2, and needs no trame. A series
@@ -148,9 +146,6 @@ class PlotterVDIs(Component):
         ----------
         filename : path-like or None
             Where the page is written; ``.html`` is put in the place of another suffix.
-        controls : {"all", "none"}
-            Whether the page has a bar of buttons (reset, views, clipping, picture, link and
-            others), which fades.
 
         Returns
         -------
@@ -167,7 +162,7 @@ class PlotterVDIs(Component):
         VDIFileError
             If the file cannot be written.
         InvalidArgumentError
-            If the plotter is gone, or ``controls`` is something else.
+            If the plotter is gone, or has subplots.
 
         Examples
         --------
@@ -176,10 +171,8 @@ class PlotterVDIs(Component):
         >>> actor = plotter.add_vdi(pv.Wavelet(), cmap="bone")
         >>> plotter.vdi.export_html("scene.html")  # doctest: +SKIP
         """
-        page: io.StringIO | None = registry.method("plotter.vdi.export_html")(
-            self._plotter, filename, controls=controls
-        )
-        return page
+        export = registry.method("plotter.vdi.export_html")
+        return export(self._plotter, filename)  # type: ignore[no-any-return]
 
     def add_transfer_function_editor(
         self,

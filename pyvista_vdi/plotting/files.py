@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError, with_article
+from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError
 from pyvista_vdi.io import read, write
 from pyvista_vdi.io.axes import to_world
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, head_of
@@ -79,7 +79,7 @@ def write_vdi(dataset: Any, path: str, **options: Any) -> None:
     """
     if not is_vdi_image(dataset):
         raise InvalidVDIError(
-            f"{with_article(type(dataset).__name__)} that holds no VDI cannot be written "
+            f"{type(dataset).__name__} that holds no VDI cannot be written "
             f"to {path}: generate one of it by dataset.vdi.generate(camera, window_size), and save "
             "that"
         )

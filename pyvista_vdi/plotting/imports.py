@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -45,18 +43,6 @@ def volumes_in(file: Path) -> Any:
     from pyvista_vdi.plotting import files
 
     return files.volumes_in(file)
-
-
-def vtk_steps(file: str) -> tuple[Sequence[Any], tuple[float, ...]]:
-    """Return what VTK's reader of a file gives at each of its times, when asked, and the times.
-
-    There are none where it announces none, or the file cannot be read.
-    """
-    with suppress(Exception):  # of each format; reading one volume says what is wrong
-        from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
-
-        return steps_and_times(import_pyvista().get_reader(file).reader)
-    return (), ()
 
 
 def why_no_window() -> str | None:

@@ -28,7 +28,7 @@ _UNNAMED = "Data"
 
 def load(volume: StoredVolume) -> Volume:
     """Read a level of a store and log which; DeviceMemoryError if the host lacks the memory."""
-    remedy = "open a coarser level by pyvista_vdi.open_volume(path, level=...), or generate a VDI"
+    remedy = "open a coarser level by pyvista_vdi.read_volume(path, level=...), or generate a VDI"
     require_host_memory(
         volume.array.nbytes, f"the volume in {volume.store.path}", remedy, free=True
     )

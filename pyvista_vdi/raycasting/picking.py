@@ -19,7 +19,6 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag, as_float, as_range
-from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
@@ -71,12 +70,12 @@ class Pick:
     @property
     def opacity(self) -> float:
         """Opacity of the length of it that the ray crosses."""
-        return float(opacity(self.optical_depth))
+        return -math.expm1(-self.optical_depth)
 
     @property
     def accumulated_opacity(self) -> float:
         """Opacity of the ray from its beginning up to where it leaves the supersegment."""
-        return float(opacity(self.accumulated_optical_depth))
+        return -math.expm1(-self.accumulated_optical_depth)
 
 
 class FirstHit(NamedTuple):

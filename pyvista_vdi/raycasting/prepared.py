@@ -23,7 +23,6 @@ from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.kernels import (
     COUNT_PACKED,
     COUNT_SUPERSEGMENTS,
-    COUNTED,
     ENDS_OF_LISTS,
     OCCUPIED_SLABS,
     PREPARE_LISTS,
@@ -102,14 +101,14 @@ class OccupancyGrid:
             self.counts = keep(runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts"))
             self.masks = keep(runtime.buffer((high, wide), np.uint64, "occupancy masks"))
             # Count, and sum up by stacks
-            grid = COUNTED(
-                width=width,
-                height=height,
-                stacks_wide=wide,
-                first_depth=self.first_depth,
-                slabs_per_depth=self.slabs_per_depth,
-                margin=self.margin,
-            )
+            grid = {
+                "width": width,
+                "height": height,
+                "stacks_wide": wide,
+                "first_depth": self.first_depth,
+                "slabs_per_depth": self.slabs_per_depth,
+                "margin": self.margin,
+            }
             runtime.fill(self.counts, np.uint32(0))
             count(grid=grid, changes=self.counts)
             occupied = runtime.bind(

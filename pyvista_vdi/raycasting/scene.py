@@ -17,7 +17,6 @@ from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
-from pyvista_vdi.raycasting.kernels import FRAME
 from pyvista_vdi.raycasting.packets import LANES, Packets, packets_of
 from pyvista_vdi.raycasting.picking import FirstHit
 from pyvista_vdi.raycasting.prepared import PreparedVDI
@@ -221,20 +220,20 @@ class Scene:
             "forms": forms,
             "opaque_depth": ends,
             "masks": occupancy.masks,
-            "frame": FRAME(
-                lists_wide=prepared.window[0],
-                lists_high=prepared.window[1],
-                width=self.size[0],
-                height=self.size[1],
-                planes=self.planes,
-                depth_origin=prepared.depth_origin,
-                cutoff=-math.log(cutoff) if self.segments else cutoff,
-                first_depth=occupancy.first_depth,
-                slabs_per_depth=occupancy.slabs_per_depth,
-                depth_step=prepared.depth_step,
-                nearest_offset=prepared.nearest - prepared.depth_origin,
-                regions=self.cropped.regions,
-            ),
+            "frame": {
+                "lists_wide": prepared.window[0],
+                "lists_high": prepared.window[1],
+                "width": self.size[0],
+                "height": self.size[1],
+                "planes": self.planes,
+                "depth_origin": prepared.depth_origin,
+                "cutoff": -math.log(cutoff) if self.segments else cutoff,
+                "first_depth": occupancy.first_depth,
+                "slabs_per_depth": occupancy.slabs_per_depth,
+                "depth_step": prepared.depth_step,
+                "nearest_offset": prepared.nearest - prepared.depth_origin,
+                "regions": self.cropped.regions,
+            },
         }
 
 

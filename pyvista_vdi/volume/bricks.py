@@ -18,7 +18,7 @@ from numpy.typing import DTypeLike, NDArray
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, kept_together
 from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.errors import DeviceMemoryError
-from pyvista_vdi.volume.kernels import BRICKS, SAMPLE_STEPS, WANT_BRICKS
+from pyvista_vdi.volume.kernels import SAMPLE_STEPS, WANT_BRICKS
 from pyvista_vdi.volume.rays import Variant
 
 #: Logarithms to base 2 of the cells along a brick's edge: large ones copy fewer points twice.
@@ -105,10 +105,10 @@ class BrickLayout:
         return cls(shift, gradients, (x, y, z), n, before, points, points**3 * point_bytes, 8 * n)
 
     @property
-    def numbers(self) -> NDArray[np.void]:
+    def numbers(self) -> dict[str, Any]:
         """Return it as kernels take it."""
-        counts = (*self.counts, 0)
-        return BRICKS(counts=counts, shift=self.shift, points=self.points, margin=self.before)
+        numbers = {"shift": self.shift, "points": self.points, "margin": self.before}
+        return {"counts": (*self.counts, 0), **numbers}
 
     def region(self, brick: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
         """Return where a brick lies in the grid and in its own points, both (z, y, x)."""
@@ -268,9 +268,9 @@ class StepSampler:
         self._runtime.finish()
         self.samples.release()
 
-    def sample(self, view: NDArray[np.void]) -> None:
-        """Sample steps of rays, as their numbers (``kernels.RAYS``) say."""
-        items = block_items(int(view["columns"]), int(view["rows"]))
+    def sample(self, view: dict[str, Any]) -> None:
+        """Sample steps of rays, as their numbers (``RaysOfView``) say."""
+        items = block_items(view["columns"], view["rows"])
         wanted = self._bricks.wanted(
             lambda table: self._want(items, GROUP, view=view, wanted=table)
         )

@@ -25,7 +25,6 @@ from pyvista_vdi.volume.bricks import (
     too_small,
 )
 from pyvista_vdi.volume.kernels import (
-    CLASSIFIED,
     MACROCELL_DISTANCES,
     MACROCELL_VISIBILITY,
     SCALAR_MEDIA,
@@ -322,7 +321,7 @@ def _numbers(
     part: GridPart | None,
     occlusion: OcclusionGrid | None,
     strength: float,
-) -> NDArray[np.void]:
+) -> dict[str, Any]:
     """Return the numbers of a classified volume as kernels take them."""
     infinite, size = (math.inf,) * 4, (*volume.dimensions, 0)
     nodes: tuple[float, ...] = (0,) * 4
@@ -330,19 +329,19 @@ def _numbers(
     if occlusion is not None:
         nodes = (*occlusion.nodes, 0)
         to_nodes = (*(1 / edge for edge in occlusion.cell), strength)
-    return CLASSIFIED(
-        size=size,
-        held=size,
-        macrocells=(*macrocells_over(volume.dimensions), 0),
-        part_first=(0,) * 4 if part is None else (*part.first, 0),
-        part_lower=infinite if part is None else (*part.lower, 0),
-        part_upper=infinite if part is None else (*part.upper, 0),
-        nodes=nodes,
-        to_nodes=to_nodes,
-        entries=table.entries,
-        low=table.low,
-        per_scalar=table.per_scalar,
-    )
+    return {
+        "size": size,
+        "held": size,
+        "macrocells": (*macrocells_over(volume.dimensions), 0),
+        "part_first": (0,) * 4 if part is None else (*part.first, 0),
+        "part_lower": infinite if part is None else (*part.lower, 0),
+        "part_upper": infinite if part is None else (*part.upper, 0),
+        "nodes": nodes,
+        "to_nodes": to_nodes,
+        "entries": table.entries,
+        "low": table.low,
+        "per_scalar": table.per_scalar,
+    }
 
 
 def _visibility(

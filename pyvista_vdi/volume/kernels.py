@@ -1,50 +1,16 @@
-"""The kernels of ``opencl/volume/``, and the structures that they take."""
+"""The kernels of ``opencl/volume/``."""
 
-from pyvista_vdi.device import KernelDeclaration, Struct
+from pyvista_vdi.device import KernelDeclaration
 
-#: The numbers of a volume, its classification, its ambient occlusion, and the part that is there.
-CLASSIFIED = Struct(
-    "Classified",
-    size="int4",
-    held="int4",
-    macrocells="int4",
-    part_first="int4",
-    part_lower="float4",
-    part_upper="float4",
-    nodes="int4",
-    to_nodes="float4",
-    entries="int",
-    low="float",
-    per_scalar="float",
-)
-#: The numbers of the rays of a view, or of part of its window, and which of their steps are taken.
-RAYS = Struct(
-    "RaysOfView",
-    width="int",
-    height="int",
-    first_column="int",
-    columns="int",
-    first_row="int",
-    rows="int",
-    first_step="int",
-    steps="int",
-    planes="int",
-    sample_distance="float",
-    unit_distance="float",
-)
-#: How a volume is cut into bricks.
-BRICKS = Struct("Bricks", counts="int4", shift="int", points="int", margin="int")
-
-_BRICKS, _MACROCELLS, _OCCLUSION = (
-    f"volume/{name}.cl" for name in ("bricks", "macrocells", "ambient_occlusion")
-)
-RENDER_VOLUME = KernelDeclaration("volume/render_volume.cl", "render_volume", CLASSIFIED, RAYS)
-PROJECT = KernelDeclaration("volume/project.cl", "project", CLASSIFIED, RAYS)
-WANT_BRICKS = KernelDeclaration(_BRICKS, "want_bricks", CLASSIFIED, RAYS, BRICKS)
-SAMPLE_STEPS = KernelDeclaration(_BRICKS, "sample_steps", CLASSIFIED, RAYS, BRICKS)
+_BRICKS, _MACROCELLS = "volume/bricks.cl", "volume/macrocells.cl"
+_OCCLUSION = "volume/ambient_occlusion.cl"
+RENDER_VOLUME = KernelDeclaration("volume/render_volume.cl", "render_volume")
+PROJECT = KernelDeclaration("volume/project.cl", "project")
+WANT_BRICKS = KernelDeclaration(_BRICKS, "want_bricks")
+SAMPLE_STEPS = KernelDeclaration(_BRICKS, "sample_steps")
 MACROCELL_RANGES = KernelDeclaration(_MACROCELLS, "macrocell_ranges")
 MACROCELL_DISTANCES = KernelDeclaration(_MACROCELLS, "macrocell_distances")
 MACROCELL_VISIBILITY = KernelDeclaration(_MACROCELLS, "macrocell_visibility")
 SCALAR_MEDIA = KernelDeclaration("volume/scalar_media.cl", "scalar_media")
-STEP_OPACITIES = KernelDeclaration(_OCCLUSION, "step_opacities", CLASSIFIED)
+STEP_OPACITIES = KernelDeclaration(_OCCLUSION, "step_opacities")
 AMBIENT_TRANSMITTANCES = KernelDeclaration(_OCCLUSION, "ambient_transmittances")

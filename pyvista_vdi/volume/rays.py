@@ -19,7 +19,6 @@ from pyvista_vdi.model.float32_limits import MOST_STEPS, enters_far_away
 from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed, packed_double_float
 from pyvista_vdi.model.render_options import Planes
 from pyvista_vdi.model.volume import Geometry, Grid
-from pyvista_vdi.volume.kernels import RAYS
 
 Ends = tuple[float, float, float]
 
@@ -92,19 +91,22 @@ class GridRays:
 
     def view(
         self, size: Sequence[int], planes: int, window: Rectangle | None = None, **changes: int
-    ) -> NDArray[Any]:
-        """Return the numbers of rays (``kernels.RAYS``) through part of a window, or all of it."""
+    ) -> dict[str, Any]:
+        """Return the numbers of rays (``RaysOfView``) through part of a window, or all of it."""
         width, height = size
         x0, x1, y0, y1 = window or (0, width, 0, height)
         part = {"first_column": x0, "columns": x1 - x0, "first_row": y0, "rows": y1 - y0}
-        return RAYS(
-            width=width,
-            height=height,
-            planes=planes,
-            sample_distance=self.sample_distance,
-            unit_distance=self.unit_distance,
-            **{"first_step": 0, "steps": ALL_STEPS, **part, **changes},
-        )
+        return {
+            "width": width,
+            "height": height,
+            "planes": planes,
+            "first_step": 0,
+            "steps": ALL_STEPS,
+            **part,
+            **changes,
+            "sample_distance": self.sample_distance,
+            "unit_distance": self.unit_distance,
+        }
 
 
 def checked_sample_distance(volume: Geometry, sample_distance: float | None) -> float:

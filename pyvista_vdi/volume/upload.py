@@ -174,7 +174,6 @@ class _Uploads:
                 self._kept.pop((runtime, what), None)  # its memory goes first
                 kept = None
                 self._kept[runtime, what] = kept = key, make()
-                runtime.finish()  # a thread with another queue may use it next
             return kept[1]  # type: ignore[no-any-return]
 
 
@@ -249,7 +248,6 @@ def upload_voxels(
             with kept_together() as keep:
                 voxels = keep(runtime.upload(array, f"volume {volume.name!r}"))
                 ranges = keep(_macrocell_ranges(runtime, volume.dimensions, voxels, variant))
-                runtime.finish()  # a thread with another queue may use them next
             made[key] = (voxels, ranges)
         return made[key]
 

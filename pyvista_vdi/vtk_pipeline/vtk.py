@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import locale
 import os
+import re
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -28,78 +29,16 @@ if TYPE_CHECKING:  # what editors show; with mypy every name is Any, by __getatt
     from vtkmodules.util.numpy_support import *
     from vtkmodules.util.vtkAlgorithm import *
 
-#: The names that this package, its tests and its examples use, by module.
-_NAMES = {
-    "util.misc": "calldata_type",
-    "util.numpy_support": "numpy_to_vtk vtk_to_numpy",
-    "util.vtkAlgorithm": "VTKPythonAlgorithmBase",
-    "vtkChartsCore": "vtkCompositeControlPointsItem vtkCompositeTransferFunctionItem",
-    "vtkCommonCore": (
-        "VTK_FLOAT VTK_INT VTK_UNSIGNED_CHAR VTK_UNSIGNED_INT mutable reference vtkCollection "
-        "vtkDataArray vtkErrorCode vtkFloatArray vtkInformation vtkMath vtkObject vtkObjectBase "
-        "vtkOutputWindow vtkStringArray vtkStringOutputWindow vtkUnsignedCharArray vtkVersion "
-        "vtkWeakReference"
-    ),
-    "vtkCommonDataModel": (
-        "vtkCellArray vtkCompositeDataSet vtkDataObject vtkDataSetAttributes vtkImageData "
-        "vtkMultiBlockDataSet vtkPiecewiseFunction vtkPlane vtkPlaneCollection vtkPolyData "
-        "vtkRectilinearGrid "
-        "vtkSelectionNode vtkUniformGrid"
-    ),
-    "vtkCommonExecutionModel": "vtkAlgorithm vtkStreamingDemandDrivenPipeline vtkTrivialProducer",
-    "vtkCommonMath": "vtkMatrix4x4",
-    "vtkCommonTransforms": "vtkTransform",
-    "vtkFiltersCore": (
-        "vtkCellDataToPointData vtkContourFilter "
-        "vtkImageAppend vtkResampleToImage vtkTriangleFilter"
-    ),
-    "vtkFiltersGeneral": "vtkMultiBlockDataGroupFilter vtkTransformFilter",
-    "vtkFiltersGeometry": "vtkDataSetSurfaceFilter",
-    "vtkFiltersHybrid": "vtkImplicitModeller vtkTemporalInterpolator",
-    "vtkFiltersSources": "vtkPlaneSource vtkSphereSource",
-    "vtkIOImage": (
-        "vtkDICOMImageReader vtkMetaImageReader vtkMetaImageWriter vtkNIFTIImageReader "
-        "vtkNIFTIImageWriter vtkNrrdReader vtkPNGWriter"
-    ),
-    "vtkIOXML": "vtkXMLImageDataReader vtkXMLImageDataWriter",
-    "vtkIOXdmf2": "vtkXdmfReader",
-    "vtkImagingCore": (
-        "vtkExtractVOI vtkImageCast vtkImageChangeInformation vtkImageConstantPad "
-        "vtkImageFlip vtkImageMagnify vtkImageMirrorPad vtkImagePermute vtkImageResample "
-        "vtkImageReslice vtkImageResize vtkImageShiftScale vtkImageShrink3D vtkImageThreshold "
-        "vtkImageTranslateExtent vtkRTAnalyticSource"
-    ),
-    "vtkImagingGeneral": "vtkImageGaussianSmooth vtkImageMedian3D",
-    "vtkImagingHybrid": "vtkGaussianSplatter",
-    "vtkImagingSources": "vtkImageGaussianSource vtkImageSinusoidSource",
-    "vtkInteractionStyle": "vtkInteractorStyleTrackballCamera",
-    "vtkRenderingAnnotation": (
-        "vtkAnnotatedCubeActor vtkAxesActor vtkCaptionActor2D vtkCornerAnnotation vtkScalarBarActor"
-    ),
-    "vtkRenderingCore": (
-        "vtkActor vtkActor2D vtkAssembly vtkBillboardTextActor3D vtkCamera vtkCameraInterpolator "
-        "vtkColorTransferFunction vtkFollower vtkHardwarePicker vtkHardwareSelector vtkImageActor "
-        "vtkImageSlice vtkLight vtkLightKit vtkMapper vtkPolyDataMapper vtkPolyDataMapper2D "
-        "vtkProp3D vtkPropAssembly vtkPropCollection vtkPropPicker vtkRenderWindow "
-        "vtkRenderWindowInteractor vtkRenderer vtkSelectVisiblePoints vtkTextActor vtkTextMapper "
-        "vtkTextProperty vtkTexture vtkTexturedActor2D vtkVolume vtkVolumeProperty "
-        "vtkWindowToImageFilter"
-    ),
-    "vtkRenderingImage": "vtkImageResliceMapper",
-    "vtkRenderingLOD": "vtkLODActor",
-    "vtkRenderingLabel": "vtkLabelPlacementMapper vtkPointSetToLabelHierarchy",
-    "vtkRenderingOpenGL2": (
-        "vtkOpenGLActor vtkOpenGLGL2PSHelper vtkOpenGLShaderProperty vtkPixelBufferObject "
-        "vtkTextureObject"
-    ),
-    "vtkRenderingUI": "vtkGenericRenderWindowInteractor",
-    "vtkRenderingVolume": (
-        "vtkFixedPointVolumeRayCastMapper vtkGPUVolumeRayCastMapper vtkMultiVolume"
-    ),
-    "vtkRenderingVolumeOpenGL2": "vtkOpenGLGPUVolumeRayCastMapper",
-    "vtkViewsContext2D": "vtkContextInteractorStyle",
-}
-_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
+#: The modules that names are looked for in, one after the other: what loads least comes first.
+_MODULES = """
+vtkCommonCore vtkCommonDataModel vtkCommonExecutionModel vtkCommonMath vtkCommonTransforms
+util.misc util.numpy_support util.vtkAlgorithm
+vtkFiltersCore vtkRenderingCore vtkRenderingVolume vtkRenderingOpenGL2 vtkRenderingVolumeOpenGL2
+vtkRenderingUI vtkInteractionStyle vtkRenderingAnnotation vtkRenderingImage vtkRenderingLOD
+vtkRenderingLabel vtkFiltersGeneral vtkFiltersGeometry vtkFiltersHybrid vtkFiltersSources
+vtkImagingCore vtkImagingGeneral vtkImagingHybrid vtkImagingSources vtkIOImage vtkIOXML vtkIOXdmf2
+vtkViewsContext2D vtkChartsCore
+"""
 
 
 def _chosen() -> str:
@@ -110,16 +49,10 @@ def _chosen() -> str:
     else:
         both = find_spec("pyvista") is not None and find_spec("cvista") is not None
         name = os.environ.get("PYVISTA_VTK_BACKEND") or ("cvista" if both else "vtk")
-        if name != "vtk" and (sys.modules.get("paraview") or _pyvista_has_no_choice()):
-            name = "vtk"
+        if name != "vtk" and both:  # PyVista before 0.49 has no choice, nor has ParaView
+            old = Version(metadata.version("pyvista")).release < (0, 49)
+            name = "vtk" if old or sys.modules.get("paraview") else name
     return "vtkmodules" if name == "vtk" else name
-
-
-def _pyvista_has_no_choice() -> bool:
-    try:
-        return Version(metadata.version("pyvista")).release < (0, 49)
-    except metadata.PackageNotFoundError:
-        return False
 
 
 #: The package of the build that this process uses: "vtkmodules" or "cvista".
@@ -128,33 +61,33 @@ BACKEND = _chosen()
 #: Of VTK's output window, while what is written to it is caught.
 _window_lock = threading.RLock()
 
-#: Debian's packages of the libraries that VTK's wheels link to and do not bring.
-_PACKAGES = {
-    "libGL.so.1": "libgl1",
-    "libEGL.so.1": "libegl1",
-    "libX11.so.6": "libx11-6",
-    "libXrender.so.1": "libxrender1",
-    "libXcursor.so.1": "libxcursor1",
-    "libXft.so.2": "libxft2",
-    "libXt.so.6": "libxt6",
-    "libSM.so.6": "libsm6",
-    "libICE.so.6": "libice6",
-}
+#: Debian's packages of what VTK's wheels link to and do not bring, and of drawing off-screen.
+_DEBIAN = "libgl1 libegl1 libgl1-mesa-dri libx11-6 libxrender1 libxcursor1 libxft2 libxt6 libsm6"
 
 
 def __getattr__(name: str) -> Any:
-    home = _HOMES.get(name, name)
-    if not home.startswith(("vtk", "util.")):
+    if not name.startswith(("vtk", "VTK", "numpy_to", "mutable", "reference", "calldata")):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:
-        module = import_module(f"{BACKEND}.{home}")
-        value = module if home == name else getattr(module, name)
+        value = import_module(f"{BACKEND}.{name}") if name in _MODULES.split() else _found(name)
     except ImportError as error:
         raise explain_import_error(error) from error
-    except AttributeError as error:
-        raise explain_import_error(ImportError(f"{BACKEND} has no {name}")) from error
     globals()[name] = value
     return value
+
+
+def _found(name: str) -> Any:
+    """Return what has a name in one of VTK's modules, or raise ImportError."""
+    first: ImportError | None = None
+    for home in _MODULES.split():
+        try:
+            module = import_module(f"{BACKEND}.{home}")
+        except ImportError as error:  # a build may lack some
+            first = first or error
+            continue
+        if hasattr(module, name):
+            return getattr(module, name)
+    raise first or ImportError(f"{BACKEND} has no {name}")
 
 
 def weakly(thing: Any) -> Callable[[], Any]:
@@ -185,13 +118,11 @@ def caught_messages() -> Iterator[Any]:
 def explain_import_error(error: ImportError) -> MissingDependencyError:
     """Return the error that tells how to make VTK importable: which Debian package it lacks."""
     text = str(error)
-    for library, package in _PACKAGES.items():
-        if library in text:
-            return MissingDependencyError(
-                f"VTK cannot be loaded, because the system library {library} is missing: on "
-                f"Debian and Ubuntu install '{package}' (and 'libegl1 libgl1-mesa-dri' to render "
-                "off-screen)"
-            )
+    if library := re.search(r"lib[\w-]+\.so[.\d]*", text):
+        return MissingDependencyError(
+            f"VTK cannot be loaded, because the system library {library[0]} is missing: on "
+            f"Debian and Ubuntu apt install {_DEBIAN}"
+        )
     if BACKEND == "vtkmodules":
         return MissingDependencyError(
             f'VTK cannot be loaded ({text}): install it by pip install "pyvista-vdi[plot]"'

@@ -8,18 +8,14 @@ and the core of extensions, is found by ``pyvista_vdi/registry.py``.
 from __future__ import annotations
 
 import ast
-import os
 import re
-import subprocess
-import sys
-import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from fresh_python import run_python
 
 import pyvista_vdi
-from pyvista_vdi import registry
 
 PACKAGE = Path(pyvista_vdi.__file__).parent
 
@@ -34,7 +30,6 @@ OWNERS = {
     "paraview": ("extensions.paraview",),
     "pyopencl": ("device",),
     "pyvista": ("plotting", "examples", "extensions.web", "measure", "cli"),
-    "trame": ("extensions.web",),
     "traitlets": ("extensions.web",),
     "vtk": (),
     "vtkmodules": ("vtk_pipeline", "extensions.paraview"),
@@ -65,26 +60,6 @@ LEVELS = (
     ("extensions.series",),
     ("extensions.sets", "extensions.insitu", "extensions.paraview"),
     ("extensions.web",),
-)
-
-#: Rooms in a room, likewise from the lowest to the highest.
-LEVELS_WITHIN = {
-    "io": (
-        ("progress",),
-        ("png", "time_steps", "vdi_file", "axes"),
-        ("stores",),
-        ("volumes",),
-        ("files",),
-    ),
-    "vtk_pipeline": (("vtk",), ("filters",), ("interaction",), ("drawing",)),
-}
-
-#: Rooms that need VTK or PyVista in order to be imported.
-WITH_VTK = (
-    *("vtk_pipeline", "plotting", "extensions.paraview", "extensions.web.scene"),
-    "extensions.web.plotter_widget",
-    *("extensions.series.shown", "extensions.sets.shown"),
-    "extensions.paraview.parts",
 )
 
 #: Slow to import, or optional: never loaded by ``import pyvista_vdi``.
@@ -179,90 +154,18 @@ def test_arrows_point_down(arrows):
     assert not offences, "\n".join(offences)
 
 
-@pytest.mark.parametrize("room", list(LEVELS_WITHIN))
-def test_arrows_point_down_within(room, arrows):
-    levels = LEVELS_WITHIN[room]
-    offences = []
-    for name, targets in arrows.items():
-        for target, line in targets.items():
-            parts, to = name.split("."), target.split(".")
-            if parts[0] != room or to[0] != room or len(parts) < 2 or len(to) < 2:
-                continue
-            if parts[1] != to[1] and _floor(levels, to[1]) >= _floor(levels, parts[1]):
-                offences.append(f"{name}:{line} imports {target}")
-    assert not offences, "\n".join(offences)
-
-
-def test_no_modules_import_each_other_in_a_circle(arrows):
-    circle = _circle({name: set(targets) for name, targets in arrows.items()})
-    assert not circle, " -> ".join(circle)
-
-
-def _circle(graph):
-    """Return one circle of a graph {name: names}, or an empty list."""
-    state, stack = {}, []
-
-    def visit(name):
-        state[name] = "open"
-        stack.append(name)
-        for target in sorted(graph.get(name, ())):
-            if state.get(target) == "open":
-                return [*stack[stack.index(target) :], target]
-            if target not in state and (found := visit(target)):
-                return found
-        state[name] = "done"
-        stack.pop()
-        return []
-
-    for name in sorted(graph):
-        if name not in state and (found := visit(name)):
-            return found
-    return []
-
-
-def test_the_search_for_circles_finds_one():
-    assert _circle({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == ["a", "b", "c", "a"]
-    assert _circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
-
-
-def test_the_house_has_few_rooms_and_few_loose_modules():
-    modules = {_name(path).partition(".")[0] for path in _modules()}
-    rooms = {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - {"opencl"}
-    loose = modules - rooms - {"__init__", "__main__", "_version"}
-    assert len(rooms) <= 15, sorted(rooms)
-    assert len(loose) <= 4, sorted(loose)
-
-
 def _engine_modules():
-    """Return the dotted names of every module that must import without VTK and PyVista."""
-    names = [_name(path) for path in _modules()]
-    return sorted(
-        f"pyvista_vdi.{name}"
-        for name in names
-        if not f"{name}.".startswith(tuple(f"{room}." for room in (*WITH_VTK, "__main__")))
-        and name != "__init__"
-    )
+    """Return the dotted names of the modules below the VTK pipeline, and of the command line."""
+    floor = _floor(LEVELS, "vtk_pipeline")
+    rooms = {name for level in LEVELS[:floor] for name in level} | {"cli"}
+    return sorted(f"pyvista_vdi.{name}" for name in map(_name, _modules()) if _room(name) in rooms)
 
 
 def _run(code):
-    """Run ``code`` in a fresh interpreter away from any checkout; return what it prints."""
-    environment = {key: value for key, value in os.environ.items() if not key.startswith("COV_")}
-    # with a relative or empty entry the interpreter would look in the current folder
-    environment["PYTHONPATH"] = os.pathsep.join(
-        str(Path(entry).resolve())
-        for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep)
-        if entry
-    )
-    result = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=tempfile.gettempdir(),
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert result.returncode == 0, result.stderr
-    return result.stdout
+    """Run ``code`` in a fresh interpreter; return what it prints."""
+    done = run_python(code)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def test_engine_imports_without_vtk_and_pyvista():
@@ -289,14 +192,6 @@ def test_importing_the_package_loads_little_and_touches_no_environment():
     # The package's own core and the standard library's modules that it needs stay under this; a
     # single heavy import (scikit-image: about 400 modules, PyVista: about 1000) is far beyond it
     assert len(loaded) < 60, loaded
-
-
-def test_checkers_of_types_are_told_every_public_name():
-    stub = (PACKAGE / "__init__.pyi").read_text(encoding="utf-8")
-    told = {*re.findall(r" as (\w+)$", stub, re.MULTILINE), *pyvista_vdi.errors.__all__}
-    assert {*pyvista_vdi.__all__} <= told
-    gone = told - {*pyvista_vdi.__all__}
-    assert not gone or len(registry.extensions()) < 7, gone
 
 
 def test_every_public_name_resolves():

@@ -12,7 +12,6 @@ import pyvista as pv
 from PIL import Image
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import with_article
 from pyvista_vdi.io.volumes import read_volume
 
 pytestmark = pytest.mark.gl
@@ -27,23 +26,6 @@ def plotter():
     plotter.close()
 
 
-def missed_by_a_dial(plotter, tmp_path):
-    camera = pvdi.Camera((5, -40, 20), (5, 5, 5), (0, 0, 1))
-    pvdi.generate(
-        pvdi.Volume(VALUES), camera, (48, 32), cmap="bone", max_bytes=1, target_ssim=0.999
-    )
-
-
-def opacity_of_colours(plotter, tmp_path):
-    grid = pv.ImageData(dimensions=(6, 6, 6))
-    colours = np.full((216, 4), 90, np.uint8)
-    plotter.add_vdi(grid, scalars=colours, opacity="sigmoid")
-
-
-def a_mapper_of_vtk(plotter, tmp_path):
-    plotter.add_vdi(VALUES, mapper="gpu")
-
-
 def slices_that_are_missing(plotter, tmp_path):
     for number in (1, 2, 5):
         Image.fromarray(np.full((4, 4), number, np.uint8)).save(tmp_path / f"{number}.png")
@@ -56,25 +38,6 @@ def an_effect_that_does_not_see_it(plotter, tmp_path):
     plotter.screenshot(return_img=True)
 
 
-def drawn_by_a_renderer(plotter, tmp_path):
-    plotter.add_vdi(VALUES, show_scalar_bar=False)
-    plotter.enable_ssao()
-    plotter.ren_win.Render()
-
-
-def a_page_without_all(plotter, tmp_path):
-    plotter.add_vdi(VALUES, show_scalar_bar=False)
-    plotter.show_grid()
-    plotter.vdi.export_html(tmp_path / "page.html")
-
-
-def a_view_from_inside(plotter, tmp_path):
-    plotter.add_vdi(VALUES, settings=pvdi.Settings(coverage="bounds"), draw="vdi")
-    plotter.camera.position, plotter.camera.focal_point = (5, 5, 5), (6, 5, 5)
-    plotter.camera_set = True
-    plotter.screenshot(return_img=True)
-
-
 def a_camera_that_looks_away(plotter, tmp_path):
     away = ((50, 5, 5), (90, 5, 5), (0, 0, 1))  # as PyVista's camera_position
     pvdi.generate(pvdi.Volume(VALUES), away, (8, 8))
@@ -82,14 +45,8 @@ def a_camera_that_looks_away(plotter, tmp_path):
 
 CASES = [
     a_camera_that_looks_away,
-    missed_by_a_dial,
-    opacity_of_colours,
-    a_mapper_of_vtk,
     slices_that_are_missing,
     an_effect_that_does_not_see_it,
-    drawn_by_a_renderer,
-    pytest.param(a_page_without_all, marks=pytest.mark.extension("web")),
-    a_view_from_inside,
 ]
 
 
@@ -111,23 +68,3 @@ def test_no_module_warns_by_itself_or_changes_the_filters():
     forbidden = re.compile(r"(?<![\w.])warnings\.(warn|catch_warnings|(simple)?filter\w*)\(")
     found = [path for path in package.rglob("*.py") if forbidden.search(path.read_text("utf-8"))]
     assert {path.relative_to(package).parts[0] for path in found} <= {"cli"}, found
-
-
-@pytest.mark.parametrize(
-    ("name", "named"),
-    [
-        ("ImageData", "an ImageData"),
-        ("UnstructuredGrid", "an UnstructuredGrid"),
-        ("UniformGrid", "a UniformGrid"),
-        ("PolyData", "a PolyData"),
-        ("uint8", "a uint8"),
-        ("int", "an int"),
-    ],
-)
-def test_articles_go_by_how_names_are_spoken(name, named):
-    assert with_article(name) == named
-
-
-def test_what_is_no_uniform_grid_is_refused_in_english(plotter):
-    with pytest.raises(pvdi.UnsupportedError, match="an UnstructuredGrid is not a uniform grid"):
-        pvdi.generate(pv.UnstructuredGrid(), pv.Camera(), (8, 8), cmap="bone")

@@ -11,18 +11,17 @@ import sys
 import nrrd
 import numpy as np
 import pytest
-from command_line import complaint, outcome, run
+from command_line import complaint, run
 from extension_marks import cases
 from PIL import Image
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io, registry
-from pyvista_vdi.cli import inputs, parser
-from pyvista_vdi.io.volumes import read_volume
+from pyvista_vdi.cli import parser
 from pyvista_vdi.model.standard_cases import filling_camera
 
 NAMES = """
-devices generate render view turntable movie info convert serve series set compare tradeoff
+devices generate render view info convert serve series set compare tradeoff
 paraview
 """
 OF_EXTENSIONS = {"paraview": "paraview", "series": "series", "set": "sets", "serve": "web"}
@@ -66,18 +65,11 @@ def folder(tmp_path_factory):
 
 
 def test_help_names_every_verb(capsys):
-    out = run(capsys, "--help")
+    out = run(capsys)
+    assert out == run(capsys, "--help")
+    assert out.count("\n") <= 24, "a screen"
     # argparse begins a new line behind a long one
     assert set(VERBS) == set(re.findall(r"^    ([a-z]+)(?:\s|$)", out, re.MULTILINE))
-
-
-def test_without_a_verb_it_shows_commands_that_parse(capsys):
-    out = run(capsys)
-    shown = re.findall(r"^  pyvista-vdi (.+?)(?:  .*)?$", out, re.MULTILINE)
-    assert [line.split()[0] for line in shown][:2] == ["generate", "view"]
-    assert len(shown) == 6
-    for line in shown:
-        assert parser.parse(line.split()) is not None
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -94,7 +86,7 @@ def test_each_verb_explains_itself_with_an_example(verb, capsys):
         ("generat", "there is no subcommand 'generat': did you mean 'generate'?"),
         (
             "zzz",
-            "there is no subcommand 'zzz': known are devices, generate, render, view, turntable",
+            "there is no subcommand 'zzz': known are devices, generate, render, view, info",
         ),
         ("info", "one of the arguments FILE --example is required; see pyvista-vdi info --help"),
         # Not "argument VOLUME: not allowed with argument --example" for the value behind it
@@ -102,19 +94,15 @@ def test_each_verb_explains_itself_with_an_example(verb, capsys):
             "generate --example brain --qualty high -o a",
             "generate takes no argument '--qualty': did you mean '--quality'?",
         ),
-        ("info a b", "info takes no argument 'b'; see pyvista-vdi info --help"),
+        ("info a b", "info takes no argument 'b': known are --help, --example"),
         ("generate a -o b --cmpa=bone", "no argument '--cmpa=bone': did you mean '--cm"),
         ("generate -o b", "one of the arguments VOLUME --example is required"),
         ("generate a --example b -o c", "not allowed with argument"),
-        ("generate a -o b -q", "no argument '-q': see --help"),
+        ("generate a -o b -q", "no argument '-q': known are --help"),
         ("devices --jso", "no argument '--jso': did you mean '--json'?"),
         ("devices --Q", "no argument '--Q': known are --help, --json"),
         ("generate a -o b --position 1 2", "expected 3 arguments"),
         ("serve", "one of the arguments VOLUME --example is required"),
-        (
-            "benchmark --profile full",
-            "no subcommand 'benchmark': the paper's tables .* benchmarks/paper.py",
-        ),
     ],
 )
 def test_mistakes_in_the_arguments(arguments, message, capsys):
@@ -126,28 +114,23 @@ def test_mistakes_in_the_arguments(arguments, message, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     cases(
-        ("info a.vdi --spacing 1 1 2", "is a VDI: --spacing 1 1 2 is for volumes"),
-        ("view a.vdi --scalars x --screenshot b.png", "--scalars x is for volumes"),
-        ("view a.vdi --cmap bone --screenshot b.png", "a.vdi has its look, and --cmap bone"),
-        ("render v.nrrd -o a.png", "v.nrrd is no VDI.*'pyvista-vdi generate v.nrrd -o FILE.vdi'"),
-        ("convert v.nrrd -o a.vdi", "v.nrrd is no VDI.*'pyvista-vdi generate v.nrrd -o FILE.vdi'"),
+        ("info a.vdi --spacing 1 1 2", "--spacing=.*1.0, 2.0.* is for volumes, and a.vdi is a VDI"),
         (
-            "render a.vdi -o a.png --position -1.8e-15 1 1 --focal-point -1.8e-15 1 1",
-            "the same point",
+            "view a.vdi --scalars x --screenshot b.png",
+            "--scalars=x is for volumes",
         ),
-        ("render a.vdi -o a.png --view-angle -1.8e-15", "view_angle must lie .*; got -1.8e-15"),
-        ("generate v.nrrd -o b.vti", "VTK writes its own files, .*; name a .vdi file here"),
+        (
+            "view a.vdi --cmap bone --screenshot b.png",
+            "--cmap=bone is for .*a.vdi has its look",
+        ),
+        ("render v.nrrd -o a.png", "v.nrrd is no VDI.*'pyvista-vdi generate v.nrrd -o FILE.vdi'"),
+        ("generate v.nrrd -o b.vti", "cannot be written as a VDI: the name must end in .vdi"),
         (
             "generate v.nrrd -o b.vdi --transfer-function tf.json --cmap bone",
             "transfer_function stands in place of cmap",
         ),
-        (
-            "generate v.nrrd -o b.vdi --quality fast --target-ssim 0.9",
-            "both say how good pictures are to be",
-        ),
-        ("info no.html", "no.html is not a page with a VDI: .* written by VDI.save"),
         ("view cut.html --screenshot b.png", "cut.html is damaged: .*copy it from its"),
-        ("info a.html --spacing 1 1 2", "a.html is a VDI: --spacing 1 1 2 is for vol"),
+        ("info a.html --spacing 1 1 2", "--spacing=.* is for volumes, and a.html is a VDI"),
         ("generate none.nrrd -o b.vdi", "none.nrrd does not exist: check .*, or .*--example"),
         ("generate a.vdi -o b.vdi", "a.vdi is a VDI, not a volume"),
         ("compare none.nrrd --out new", "none.nrrd"),
@@ -158,23 +141,6 @@ def test_mistakes_that_the_work_finds(arguments, message, folder, capsys, monkey
     before = sorted(folder.iterdir())
     assert re.search(message, complaint(capsys, *arguments.split()))
     assert sorted(folder.iterdir()) == before
-
-
-def test_a_device_that_is_absent(folder, capsys, default_runtime):
-    absent = ("--device", "no such")
-    message = complaint(capsys, "render", folder / "a.vdi", "-o", folder / "x.png", *absent)
-    assert default_runtime.info.name in message  # it lists what exists
-    # Said before anything is read
-    message = complaint(capsys, "generate", "none.nrrd", "-o", "x.vdi", *absent)
-    assert "there is no such OpenCL device" in message
-    assert default_runtime.info.selector in message
-    assert "not probed" not in message
-
-
-def test_debug_lets_the_traceback_through(monkeypatch):
-    monkeypatch.setenv(cli.DEBUG_VARIABLE, "1")
-    with pytest.raises(pvdi.VDIFileError):
-        cli.main(["info", "none.vdi"])
 
 
 @pytest.mark.parametrize(
@@ -215,9 +181,9 @@ def test_nothing_that_a_file_says_reaches_the_terminal_raw(capsys, tmp_path):
 def test_info(folder, capsys):
     out = run(capsys, "info", folder / "a.vdi")
     lines = dict(line.split("  ", 1) for line in out.splitlines())
-    assert lines["lists"].strip() == "24 x 16"
-    assert lines["supersegments"].strip() == "200, 0.52 per list"
-    assert lines["criterion"].strip() == '"none"'
+    assert lines["window_size"].strip() == "[24, 16]"
+    assert lines["n_supersegments"].strip() == "200"
+    assert lines["criterion"].strip() == "none"
     out = run(capsys, "info", folder / "a.vdi", "--json")
     about = json.loads(out)
     assert about["n_supersegments"] == 200
@@ -228,13 +194,12 @@ def test_info_of_a_volume(folder, capsys):
     arguments = ("info", folder / "v.nrrd", "--spacing", "1", "2", "3", "--origin", "0", "0", "5")
     out = run(capsys, *arguments)
     lines = {name: text.strip() for name, text in (x.split("  ", 1) for x in out.splitlines())}
-    volume = read_volume(folder / "v.nrrd")
+    volume = pvdi.read_volume(folder / "v.nrrd")
     nx, ny, nz = volume.dimensions
-    assert lines["points"] == f"{nx} x {ny} x {nz}"
-    assert lines["spacing"] == "(1, 2, 3)"
-    assert lines["origin"] == "(0, 0, 5)"
-    assert lines["bounds"] == f"(0, {nx - 1}, 0, {2 * (ny - 1)}, 5, {5 + 3 * (nz - 1)})"
-    about = json.loads(outcome(capsys, *arguments, "--json")[1])
+    assert lines["dimensions"] == f"[{nx}, {ny}, {nz}]"
+    assert lines["spacing"] == "[1.0, 2.0, 3.0]"
+    assert lines["origin"] == "[0.0, 0.0, 5.0]"
+    about = json.loads(run(capsys, *arguments, "--json"))
     assert about["range"] == [*volume.finite_range()]
     assert about["dimensions"] == [nx, ny, nz]
 
@@ -268,7 +233,7 @@ def test_a_page_is_taken_as_a_vdi_is(folder, capsys, default_runtime, tmp_path):
         for source, picture in zip((page, file), pictures, strict=True):
             run(capsys, verb, source, option, picture)
         assert pictures[0].read_bytes() == pictures[1].read_bytes()
-    about = [json.loads(outcome(capsys, "info", name, "--json")[1]) for name in (page, file)]
+    about = [json.loads(run(capsys, "info", name, "--json")) for name in (page, file)]
     own = ("path", "file_bytes")
     one, other = ({k: v for k, v in state.items() if k not in own} for state in about)
     assert one == {**other, "codec": "deflate", "format_version": 4}
@@ -287,7 +252,6 @@ def test_generate_by_a_dial(folder, capsys, default_runtime, tmp_path):
     arguments = (*arguments, "--size", "60x40", "-o", target)
     asked = ("--quality", "fast", "--max-bytes", "1e9", "--target-angle", "20")
     out = run(capsys, *arguments, *asked)
-    assert "settings are chosen by a measurement" in out
     vdi = io.read(target)
     width, height = vdi.window_size
     assert f"{width} x {height} lists, " in out
@@ -311,7 +275,6 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
     table = ("--transfer-function", folder / "tf.json")
     out = run(capsys, "generate", folder / "v.nrrd", "-o", target, *table, *options.split())
     assert "20 x 12 lists" in out
-    assert "up to" in out
     vdi = io.read(target)
     assert vdi.window_size == (20, 12)
     assert vdi.counts.max() <= 7
@@ -326,34 +289,6 @@ def test_generate_from_a_table_and_render(folder, capsys, default_runtime, tmp_p
         expected = io.to_bytes(pvdi.render(vdi, vdi.camera, (30, 10)))
         assert np.array_equal(np.asarray(image), expected)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b.png", "b.vdi"]
-
-
-def test_camera_options(folder):
-    default = pvdi.Camera((0, -10, 0), (0, 0, 0), (0, 0, 1))
-
-    def view(options):
-        return inputs.camera(parser.parse(f"render a -o b {options}".split()), default)
-
-    assert view("") == default
-    assert view("--azimuth 30 --elevation -5") == default.azimuth(30).elevation(-5)
-    moved = view("--position -1 -2.5 3 --view-angle 20")
-    assert (moved.position, moved.view_angle) == ((-1, -2.5, 3), 20)
-    parallel = view("--parallel-scale 4")
-    assert (parallel.parallel_projection, parallel.parallel_scale) == (True, 4)
-    assert view(f"--camera-json {folder / 'camera.json'}") == VIEW
-    options = parser.parse(["render", "a", "-o", "b", "--view-angle", "20"])
-    assert not inputs.camera(options, parallel).parallel_projection
-
-
-def test_help_loads_nothing_slow():
-    code = (
-        "import sys; from pyvista_vdi.cli import main\n"
-        "assert main(['--help']) == 0 and main(['generate', '--help']) == 0\n"
-        "heavy = {'cvista', 'vtk', 'vtkmodules', 'pyvista', 'pyopencl', 'scipy', 'skimage',\n"
-        "    'matplotlib'}\n"
-        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
 
 
 def test_the_module_is_the_command():

@@ -41,25 +41,20 @@ def test_info_tells_levels_and_reads_no_voxel(image, capsys):
         chunk.write_bytes(b"rubbish")
     assert main(["info", str(image)]) == 0
     said = capsys.readouterr().out
-    for part in (
-        "dapi, uint8, range not known yet",
-        "OME-Zarr 0.4: 2 along c, 16 along z, 24 along y, 32 along x\n",
-        "lengths    in micrometer\n",
-        "level 1    16 x 12 x 8 points, spacing (1, 1, 1)",
-    ):
+    for part in ("OME-Zarr 0.4", '{"c": 2, "z": 16, "y": 24, "x": 32}', '"points": [16, 12, 8]'):
         assert part in said
     assert main(["info", str(image), "--json"]) == 0
     about = json.loads(capsys.readouterr().out)
     assert about["range"] is None
-    assert about["store"]["channels"] == ["dapi", "gfp"]
+    assert about["channels"] == ["dapi", "gfp"]
 
 
 @pytest.mark.extension("large")
-def test_generate_says_the_level_and_why(image, tmp_path, capsys, default_runtime):
+def test_generate_says_the_level(image, tmp_path, capsys, default_runtime):
     target = tmp_path / "x.vdi"
     files = (str(image), "-o", str(target), "--size", "8x4", "--channel", "gfp", *LOOK)
     assert main(["generate", *files]) == 0
-    assert "level 1 of 2 (16 x 12 x 8 points): the coarsest" in capsys.readouterr().err
+    assert "level 1 of 2: 16 x 12 x 8 points" in capsys.readouterr().err
     assert pvdi.read(target).metadata["volume"]["dimensions"] == [16, 12, 8]
     assert main(["generate", *files, "--level", "0"]) == 0
-    assert "level 0 of 2 (32 x 24 x 16 points): asked for" in capsys.readouterr().err
+    assert "level 0 of 2: 32 x 24 x 16 points" in capsys.readouterr().err

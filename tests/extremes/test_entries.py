@@ -39,9 +39,9 @@ def is_far(runtime, volume, camera, window=WINDOW):
     return medium.rays.forms(camera, window).double_float
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("lit", [False, True])
-@pytest.mark.parametrize(("thinness", "far"), [(123, False), (125, True)])
+@pytest.mark.parametrize(
+    ("thinness", "far", "lit"), [(123, False, False), (125, True, False), (125, True, True)]
+)
 def test_the_bound_holds_on_both_sides_of_the_border(runtime, worst, thinness, far, lit):
     """The scenes differ by a hundredth, and their pictures hardly; the arithmetic changes."""
     volume = field_volume((1, 1 / thinness, 1))
@@ -70,8 +70,7 @@ def test_needles(runtime, worst):
     check_views(runtime, worst, vdi, turned(camera, volume, (8,), zoom=True), least_drawn=0)
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("criterion", CRITERIA[:1])
 def test_supersegments_of_far_entries_are_ordered_and_have_a_thickness(runtime, worst, criterion):
     """Steps of few units in the last place of their depth, which rounding could make nothing."""
     volume = field_volume((1e-3, 1, 1e3))
@@ -93,7 +92,7 @@ def test_supersegments_of_far_entries_are_ordered_and_have_a_thickness(runtime, 
 PLATE = (2, 6, 1e-3, 5e-3, 1, 5)
 
 
-@pytest.mark.parametrize("end", ["none", "plane", "opaque", "subvolume", "fence", "inverted_cross"])
+@pytest.mark.parametrize("end", ["plane", "opaque", "fence"])
 def test_far_entries_are_clipped_cropped_and_ended(runtime, worst, end):
     """A constant medium absorbs by the length that is left of each ray."""
     volume = Volume(np.ones((7, 8, 9), np.uint8), (1, 1e-3, 1))
@@ -133,10 +132,8 @@ def test_far_entries_are_clipped_cropped_and_ended(runtime, worst, end):
 EYE = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=16)
 
 
-@pytest.mark.every(8)
-@pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize(
-    ("thinness", "far"), [(100, False), (127, False), (130, True), (1e5, True)]
+    ("thinness", "far", "parallel"), [(127, False, False), (130, True, False), (1e5, True, True)]
 )
 def test_v_o_sees_all_of_a_far_supersegment(runtime, worst, thinness, far, parallel):
     """Both forms of depth, on either side of the border: 128 thicknesses from the near plane."""
@@ -149,9 +146,7 @@ def test_v_o_sees_all_of_a_far_supersegment(runtime, worst, thinness, far, paral
     check_views(runtime, worst, vdi, [EYE.azimuth(a) for a in (25, 90, 180)], least_drawn=0)
 
 
-@pytest.mark.every(5)
-@pytest.mark.parametrize("precision", ["exact", "8-byte"])
-@pytest.mark.parametrize("kind", ["near", "around", "parallel"])
+@pytest.mark.parametrize(("kind", "precision"), [("near", "8-byte"), ("parallel", "exact")])
 def test_any_vdi_may_be_drawn_by_depths_relative_to_the_ray(
     runtime, worst, monkeypatch, kind, precision
 ):

@@ -8,65 +8,15 @@ import reference
 from drawing import generate_vdi, raycast_volume, render_vdi, render_vdis
 from extreme_scenes import (
     BOUND,
-    WINDOW,
     assert_within,
-    field_volume,
     slabs_vdi,
-    transfer,
-    view,
 )
+from reference.compositing import composite
 
 from pyvista_vdi import Camera, TransferFunction, Volume
-from pyvista_vdi.model.compositing import composite
 from pyvista_vdi.model.float32_limits import MANY_MEDIA, MOST_STEPS, VERY_MANY_MEDIA
 
 pytestmark = pytest.mark.extremes
-
-
-@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
-def test_opacity_of_exactly_nothing(runtime, interpolation):
-    """Zero is nothing, whatever the unit distance: no supersegment, and not a bit of colour."""
-    field = np.zeros((9, 8, 7), np.float32)  # 0 in front and behind, 1 in the middle
-    field[4:6, :, 3:] = 1
-    volume = Volume(field)
-    camera = view(volume, 0, 0, parallel=True)  # along z
-    function = TransferFunction(
-        [[1, 1, 1], [0, 1, 0], [0, 1, 0]],  # red only where there is no opacity
-        [0.0, 0.0, 0.5],  # nothing up to 1/2
-        (0, 1),
-        unit_distance=1e-6,
-        interpolation=interpolation,
-    )
-    image = raycast_volume(volume, camera, (28, 16), function, device=runtime)
-    vdi = generate_vdi(volume, camera, (28, 16), function, max_supersegments=1, device=runtime)
-    exact = reference.volume_image(volume, camera, (28, 16), function)
-    empty = exact[..., 3] == 0
-    assert 0.2 < empty.mean() < 0.8
-    for picture in (image, render_vdi(vdi, camera, device=runtime)):
-        np.testing.assert_array_equal(picture[..., 3] == 0, empty)
-        np.testing.assert_array_equal(picture[..., 0], 0.0)
-    assert (vdi.counts[::-1][empty] == 0).all()
-    # The middle lies 3 to 5.5 voxels behind the near plane, halves of cells and a step included
-    assert vdi.front.min() >= 2.0
-    assert vdi.back.max() <= 5.5
-
-
-@pytest.mark.parametrize("unit", [1e-300, 1e-45, 1e300])
-def test_unit_distances_beyond_float32(runtime, unit):
-    """As opaque, or as transparent, as those that it holds."""
-    volume = field_volume()
-    camera = view(volume)
-    held = 1e-20 if unit < 1 else 1e20
-    images = [
-        render_vdi(
-            generate_vdi(volume, camera, WINDOW, transfer(unit_distance=u), device=runtime),
-            camera,
-            device=runtime,
-        )
-        for u in (unit, held)
-    ]
-    np.testing.assert_allclose(*images, atol=1e-6)
-    assert images[0][..., 3].max() == (1.0 if unit < 1 else pytest.approx(0.0, abs=1e-6))
 
 
 EYE = Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), view_angle=10)
@@ -80,7 +30,7 @@ def crowded(n, optical_depth, camera=EYE, window=(1, 1)):
     return slabs_vdi(camera, faces, optical_depth, window=window, bounds=BOUNDS, depth_origin=9.0)
 
 
-@pytest.mark.parametrize("optical_depth", [2e-8, 2.6e-8, 1e-6, 1e-5, 2e-4])
+@pytest.mark.parametrize("optical_depth", [2e-8, 1e-6, 2e-4])
 @pytest.mark.parametrize("n", [4096, pytest.param(100_000, marks=pytest.mark.slow)])
 def test_thousands_of_nearly_transparent_supersegments(runtime, worst, n, optical_depth):
     """Up to 8192, what is faint keeps its digits; beyond, sums are as exact as one addition.
@@ -143,9 +93,10 @@ def test_several_vdis_of_nearly_transparent_supersegments(runtime, worst):
     assert_within(worst, "5999 supersegments", image, exact, 2e-6)
 
 
-@pytest.mark.every(4)
-@pytest.mark.parametrize("opacity", [1e-6, 0.01, 0.9])
-@pytest.mark.parametrize("steps", [1000, 10_000, pytest.param(MOST_STEPS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("opacity", "steps"),
+    [(0.01, 10_000), pytest.param(0.9, MOST_STEPS, marks=pytest.mark.slow)],
+)
 def test_very_many_steps_through_a_constant_volume(runtime, worst, steps, opacity):
     """Closed form: the opacity of a slab is what the table says, however it is cut."""
     volume = Volume(np.full((3, 3, 3), 0.5, np.float32))

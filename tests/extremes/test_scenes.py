@@ -6,8 +6,6 @@ Each scene is drawn directly and as a VDI, from some views, all of it held again
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 import reference
@@ -15,7 +13,6 @@ from drawing import generate_vdi, raycast_volume, render_vdi
 from extreme_scenes import (
     FIELD,
     WINDOW,
-    assert_within,
     check_scene,
     field_volume,
     transfer,
@@ -24,7 +21,6 @@ from extreme_scenes import (
 )
 
 from pyvista_vdi import (
-    Camera,
     InvalidCameraError,
     Light,
     Lights,
@@ -32,7 +28,6 @@ from pyvista_vdi import (
     TransferFunction,
     Volume,
 )
-from pyvista_vdi.model.float32_limits import scalars_suit_float32
 
 pytestmark = pytest.mark.extremes
 
@@ -86,19 +81,14 @@ def scaled(scale, offset=0.0):
 #: Spacing and offset in extents: from a cell in metres to a galaxy in whatever; just within
 #: float32; cells a thousand times as long as wide.
 WORLDS = {
-    "as it is": (1.0, 0.0),
     "tiny": (1e-9, 1e7),
-    "huge": (1e9, 1e7),
-    "tiniest": (1e-16, 0.0),
     "hugest": (1e16, 0.0),
-    "needle along z": ((1, 1, 1000), 0.0),
     "needle along x": ((1000, 1, 1), 0.0),
     "plate": ((1, 0.001, 1), 0.0),
 }
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("world", ["tiny", "hugest", "needle along x", "plate"])
 def test_worlds(runtime, worst, world):
     """A plate is a staircase of lists: rays in its plane, at larger angles, may pass between."""
     volume, even = field_volume(*WORLDS[world]), np.ndim(WORLDS[world][0]) == 0
@@ -106,9 +96,10 @@ def test_worlds(runtime, worst, world):
     check(runtime, worst, volume, function, (0, 25, 180) if even else (0, 8), zoom=not even)
 
 
-@pytest.mark.every(7)
-@pytest.mark.parametrize("name", ["shaded", "gradient", "both", "both, lit by lamps"])
-@pytest.mark.parametrize("world", ["tiny", "huge", "needle along z", "needle along x", "plate"])
+@pytest.mark.parametrize(
+    ("world", "name"),
+    [("tiny", "both, lit by lamps"), ("needle along x", "both"), ("plate", "gradient")],
+)
 def test_lit_worlds(runtime, worst, world, name):
     """Normals are transformed as normals: those of a needle or of a plate, too.
 
@@ -125,8 +116,6 @@ def test_lit_worlds(runtime, worst, world, name):
 MATRICES = {
     "tiny": scaled(1e-9, 1e7),
     "huge": scaled(1e9, 1e7),
-    "tiniest": scaled(1e-16),
-    "hugest": scaled(1e16),
     "mirrored": np.diag([-1, 1, 1, 1.0]),
     "stretched": np.diag([0.03, 1, 30, 1.0]),
     "sheared": np.array([[1, 5, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]),
@@ -141,8 +130,7 @@ def test_actors_matrices(runtime, worst, name):
     check(runtime, worst, field_volume(), transfer(), turns, transform=MATRICES[name], zoom=zoom)
 
 
-@pytest.mark.parametrize("exponent", [-36, -25, 25, 36])
-@pytest.mark.parametrize("by", ["spacing", "matrix"])
+@pytest.mark.parametrize(("exponent", "by"), [(-25, "spacing"), (36, "matrix")])
 def test_worlds_beyond_float32_are_refused(runtime, exponent, by):
     scale = 10.0**exponent
     volume = field_volume(scale if by == "spacing" else 1.0)
@@ -155,9 +143,7 @@ def test_worlds_beyond_float32_are_refused(runtime, exponent, by):
         render_vdi(made, camera, device=runtime)
 
 
-@pytest.mark.parametrize(
-    "shape", [(2, 2, 2), (2, 9, 9), (9, 2, 9), (9, 9, 2), (2, 2, 300)], ids=str
-)
+@pytest.mark.parametrize("shape", [(2, 2, 2), (9, 2, 9), (2, 2, 300)], ids=str)
 def test_the_smallest_volumes(runtime, worst, shape):
     """One cell, one cell thick along each axis, a row of cells."""
     volume = Volume(np.random.default_rng(shape).random(shape).astype(np.float32))
@@ -169,30 +155,18 @@ CHECKERS = np.indices(FIELD.shape).sum(axis=0) % 2  # Nyquist: neighbours differ
 #: Scalars, their type, and the range of the transfer function: every type's whole range, and ranges
 #: that float32 has few digits for.
 SCALARS = {
-    "constant": (np.full((5, 6, 7), 0.6), "float32", 0, 1),
     "checkerboard": (CHECKERS, "float32", 0, 1),
-    "int16 negative": ((FIELD - 1) * 30000, "int16", -30000, -100),
     "int16 full range": ((FIELD - 0.5) * 65535, "int16", -32768, 32767),
-    "uint16 full range": (FIELD * 65535, "uint16", 0, 65535),
-    "int8": ((FIELD - 0.5) * 255, "int8", -128, 127),
-    "int32 full range": ((FIELD - 0.5) * 4.2e9, "int32", -(2**31), 2**31 - 1),
     "uint32 full range": (FIELD * 4.2e9, "uint32", 0, 2**32 - 1),
-    "uint16 narrow": (60000 + FIELD * 100, "uint16", 60000, 60100),
     "uint16 between values": (60000 + FIELD * 100, "uint16", 60000.3, 60002.7),
-    "float32 smallest": (FIELD * 1e-40, "float32", 0, 1e-40),
     "float32 one denormal": (FIELD * 1.4e-44, "float32", 0, 1.4e-44),
-    "float32 small": (FIELD * 1e-30, "float32", 0, 1e-30),
-    "float32 largest": (FIELD * 3e38, "float32", 0, 3e38),
     "float32 both ends": ((FIELD - 0.5) * 6.7e38, "float32", -3.35e38, 3.35e38),
-    "float32 far from zero": (1e5 + FIELD, "float32", 1e5, 1e5 + 1),
     "float32 a Kelvin": (300 + FIELD * 0.02, "float32", 300.001, 300.019),
     "float64 far from zero": (1e9 + FIELD, "float64", 1e9, 1e9 + 1),
-    "float64 smallest": (FIELD * 1e-300, "float64", 0, 1e-300),
     "float64 largest": (FIELD * 1e300, "float64", 0, 1e300),
 }
 
 
-@pytest.mark.every(6)
 @pytest.mark.parametrize("name", SCALARS)
 def test_scalars(runtime, worst, name):
     values, dtype, low, high = SCALARS[name]
@@ -203,15 +177,15 @@ def test_scalars(runtime, worst, name):
         check(runtime, worst, Volume(values.astype(dtype)), function)
 
 
-@pytest.mark.every(6)
-@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
 @pytest.mark.parametrize(
-    ("value", "dtype"),
+    ("value", "dtype", "interpolation"),
     [
-        *((value, "float32") for value in (np.nan, np.inf, -np.inf, -3.4e38, 3.4e38)),
-        *((value, "float64") for value in (np.nan, -np.inf, 1e300, -1e300)),
+        (np.nan, "float32", "linear"),
+        (np.inf, "float32", "linear"),
+        (-np.inf, "float64", "nearest"),
+        (-3.4e38, "float32", "nearest"),
+        (1e300, "float64", "linear"),
     ],
-    ids=str,
 )
 def test_voxels_that_are_not_numbers_or_no_data(runtime, worst, value, interpolation, dtype):
     """NaN is transparent, infinite is the end of the table; and so is what marks missing data."""
@@ -229,9 +203,7 @@ def test_voxels_that_are_not_numbers_or_no_data(runtime, worst, value, interpola
     assert np.isfinite(render_vdi(vdi, camera.azimuth(90), device=runtime)).all()
 
 
-@pytest.mark.every(4)
-@pytest.mark.parametrize("dtype", ["float32", "float64", "int32"])
-@pytest.mark.parametrize("at", [0.1, 0.0, 7.0])
+@pytest.mark.parametrize(("at", "dtype"), [(0.1, "float64"), (0.0, "float32"), (7.0, "int32")])
 def test_a_range_of_one_scalar(runtime, worst, at, dtype):
     """At or below it the first entry holds, above it the last: also where float32 rounds it."""
     array = np.array([np.nextafter(np.float32(at), -9), at, np.nextafter(np.float32(at), 9)])
@@ -243,91 +215,17 @@ def test_a_range_of_one_scalar(runtime, worst, at, dtype):
     check(runtime, worst, Volume(cube), function)
 
 
-@pytest.mark.parametrize(("factor", "suits"), [(0.999, True), (1.001, False)])
-@pytest.mark.parametrize(("interpolation", "most"), [("linear", 64), ("nearest", 576)])
-def test_scalars_at_the_border_of_being_taken_relative(
-    runtime, worst, interpolation, most, factor, suits
-):
-    """As they are, or relative to the range on the host: within the bound on both sides."""
-    high = most * factor
-    low = high - 1.0
-    assert scalars_suit_float32(low, high, np.float32, interpolation) is suits
-    volume = Volume((low + FIELD).astype(np.float32))
-    check(runtime, worst, volume, transfer(low, high, interpolation=interpolation))
-
-
-@pytest.mark.every(4)
-@pytest.mark.parametrize("name", ["shaded", "gradient", "both"])
-@pytest.mark.parametrize("scale", [1e-40, 1e-24, 1e-20, 1e20, 3e38])
+@pytest.mark.parametrize("name", ["both"])
+@pytest.mark.parametrize("scale", [1e-40, 1e-20, 3e38])
 def test_gradients_from_denormal_to_huge(runtime, worst, scale, name):
     """Gradients whose squares float32 does not hold: densities in kg/m3, or counts of atoms."""
     volume, function = Volume((FIELD * scale).astype(np.float32)), look(name, scale)
     check(runtime, worst, volume, transfer(0, scale, **function), (0, 8), lit=True)
 
 
-@pytest.mark.every(4)
-@pytest.mark.parametrize("name", LOOKS)
-def test_rgba(runtime, worst, name):
-    colors = [FIELD, 1 - FIELD, np.roll(FIELD, 3), FIELD]
-    rgba = np.round(np.stack(colors, axis=-1) * 255).astype(np.uint8)
-    own = field_volume(1e-9, 1e7)
-    function = transfer(0, 255, unit_distance=1e-9, **look(name, 255))
-    check(runtime, worst, Volume(rgba, own.spacing, own.origin), function, (0, 8))
-
-
-@pytest.mark.parametrize("attenuation", [(0, 0, 1), (0, 0, 1e30), (1e-38, 0, 0)], ids=str)
-def test_a_light_inside_the_volume(runtime, worst, attenuation):
-    """Strengths from nothing to beyond float32, at a sample's very place."""
-    volume = field_volume()
-    centre = np.reshape(volume.bounds, (3, 2)).mean(axis=1)
-    bulb = Light(
-        "scene", centre, centre + 1, positional=True, attenuation=attenuation, cone_angle=180,
-        diffuse=(1, 0, 0.5), specular=(0, 1, 0),
-    )  # fmt: skip
-    # Two-sided: a sample whose normal is across the light jumps from none to all of it
-    check(runtime, worst, volume, transfer(shading=SHINY), (0, 8), lit=Lights((bulb,)))
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize("lit_by", ["headlight", "lamp", "back lamp"])
-@pytest.mark.parametrize("power", [99.0, 101.0, 1e4, 1e6])
-def test_the_middle_of_a_highlight(runtime, worst, power, lit_by):
-    """A ramp seen along its gradient, and nothing but its highlight, from the middle to its rim."""
-    ramp = np.broadcast_to(np.linspace(0.2, 1, 9)[:, None, None], (9, 4, 5))
-    volume = Volume(ramp.astype(np.float32))
-    centre = np.reshape(volume.bounds, (3, 2)).mean(axis=1)
-    eye = centre - [0, 0, 20]  # before the thin side, where VTK's normals look away
-    # The rim, where a thousandth is left, is half way to the window's edge
-    angle = 2 * math.degrees(math.acos(math.exp(math.log(1e-3) / power)))
-    camera = Camera(eye, centre, (0, 1, 0), view_angle=angle)
-    lights = None
-    if lit_by != "headlight":
-        place = eye if lit_by == "lamp" else centre * 2 - eye
-        lamp = Light("scene", place, centre, positional=True)
-        lights = Lights((lamp,), two_sided=lit_by == "back lamp")
-    scene = volume, camera, (9, 7), transfer(opacity=0.9, shading=Shading(0.0, 0.0, 1.0, power))
-    exact = reference.volume_image(*scene, None, lights)
-    image = raycast_volume(*scene, lights=lights, device=runtime)
-    assert exact[..., 0].max() > 0.3
-    assert exact[..., 0].min() < 0.2
-    assert_within(worst, f"power {power:g}", image, exact)
-
-
-@pytest.mark.parametrize(("parallel", "two_sided"), [(False, True), (True, False)])
-def test_an_eye_in_the_shaded_volume(runtime, worst, parallel, two_sided):
-    volume = field_volume()
-    centre = np.reshape(volume.bounds, (3, 2)).mean(axis=1)
-    camera = Camera(
-        centre, centre + np.array([0, 0.1, 1]), (0, 1, 0), view_angle=90,
-        parallel_projection=parallel, parallel_scale=4.0,
-    )  # fmt: skip
-    scene = volume, transfer(shading=SHINY), camera, [camera, camera.azimuth(20)]
-    check_scene(runtime, worst, *scene, lights=Lights(two_sided=two_sided))
-
-
 @pytest.mark.parametrize(
     ("unit", "opacity"),
-    [(1e-8, 1e-7), (1e-8, 1.0), (1.0, 1 - 2.0**-24), (1.0, 1e-7), (1e8, 0.5), (1e-4, 0.5)],
+    [(1e-8, 1.0), (1.0, 1 - 2.0**-24), (1.0, 1e-7), (1e8, 0.5)],
 )
 def test_unit_distance_and_opacity(runtime, worst, unit, opacity):
     """Unit distances per extent, and extinctions with them; opacities from hardly any to all."""
@@ -343,13 +241,13 @@ TABLES = {
     "one entry": np.where(np.arange(33) == 17, 0.9, 0),
     "step at a bin edge": np.where(np.arange(33) >= 17, 0.7, 0),
     "all zero": np.zeros(33),
-    "all one": np.ones(33),
 }
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
-@pytest.mark.parametrize("kind", TABLES)
+@pytest.mark.parametrize(
+    ("kind", "interpolation"),
+    [("one entry", "linear"), ("step at a bin edge", "nearest"), ("all zero", "linear")],
+)
 def test_transfer_functions(runtime, worst, kind, interpolation):
     # Whole multiples of a bin: nearest samples lie exactly on its edges
     field = np.round(FIELD * 32) / 32 if interpolation == "nearest" else FIELD

@@ -24,19 +24,18 @@ BOUNDS = (-1, 1, -1, 1, -1, 1)
 AROUND = [EYE, EYE.azimuth(30), EYE.azimuth(90), EYE.azimuth(180), EYE.elevation(90 - 1e-3)]
 
 
-@pytest.mark.parametrize("budget", [1, 2, 255, 4096])
+@pytest.mark.parametrize("budget", [1, 255])
 def test_budgets(runtime, worst, budget):
     """N_S from one to the most; noise whose every sample would be a supersegment of its own."""
     points = 12 if budget < 100 else 512
     volume = Volume(np.random.default_rng(budget).random((points, 8, 8)).astype(np.float32))
     camera = view(volume, 0.5, 0.3, zoom=True)
     window = WINDOW if budget < 100 else (3, 1)
-    step = 0.5 if budget < 4096 else 0.1
+    step = 0.5
     scene = (volume, camera, window, transfer(unit_distance=30.0, interpolation="nearest"))
     vdi = generate_vdi(*scene, max_supersegments=budget, sample_distance=step, device=runtime)
     assert 0 < vdi.counts.max() <= budget
-    # Nearest samples of noise: at most a supersegment a voxel crossed
-    assert vdi.counts.max() == budget or budget == 4096
+    assert vdi.counts.max() == budget
     views = [camera, camera.azimuth(5), camera.azimuth(180)]
     check_views(runtime, worst, vdi, views, size=window, least_drawn=1)
 
@@ -64,10 +63,7 @@ LISTS = {
     "one column": ([(0.2, 0.9), (0.9, 1.6)], [0.5, 1.0], (1, 7), 1),
     "one row": ([(0.2, 0.9), (0.9, 1.6)], [0.5, 1.0], (7, 1), 1),
     "as deep as float32 holds": ([(0.0, 0.5), (0.5, 3e38)], [1.0, 3e38], (3, 3), 3),
-    **{
-        f"optical depth {tau:g}": ([(0.3, 1.4)], tau, (3, 3), 3)
-        for tau in (1e-7, 1.0, 30.0, 1e6, 3e38)
-    },
+    **{f"optical depth {tau:g}": ([(0.3, 1.4)], tau, (3, 3), 3) for tau in (1e-7, 30.0, 3e38)},
     "nothing": ([], [], (4, 3), 0),
 }
 
@@ -79,18 +75,9 @@ def test_extreme_lists(runtime, worst, name):
     check_views(runtime, worst, vdi, AROUND, size=(5, 4), least_drawn=drawn)
 
 
-def test_lists_from_as_deep_as_float32_holds(runtime, worst):
-    """What is in the bounds counts."""
-    camera = EYE.replace(parallel_projection=True)
-    faces = [(-3e38, -1e38), (-1e38, 0.5), (0.5, 3e38)]
-    vdi = slabs_vdi(camera, faces, [1.0, 3e38, 3e38], window=(3, 3), bounds=BOUNDS)
-    check_views(runtime, worst, vdi, AROUND, size=(3, 3), least_drawn=0)
-
-
-@pytest.mark.every(6)
-@pytest.mark.parametrize("origin", [9.0, 0.0])
-@pytest.mark.parametrize("parallel", [False, True])
-@pytest.mark.parametrize("optical_depth", [1.0, 3e38])
+@pytest.mark.parametrize(
+    ("optical_depth", "origin", "parallel"), [(1.0, 9.0, False), (3e38, 0.0, True)]
+)
 def test_supersegments_one_ulp_thick(runtime, worst, optical_depth, origin, parallel):
     """From a denormal number thick: within what rounding of its faces makes of it, and finite."""
     camera = EYE.replace(parallel_projection=parallel)
@@ -100,23 +87,6 @@ def test_supersegments_one_ulp_thick(runtime, worst, optical_depth, origin, para
         where = {"window": (3, 3), "bounds": BOUNDS, "depth_origin": origin}
         vdi = slabs_vdi(camera, faces, optical_depth, **where)
         check_views(runtime, worst, vdi, AROUND, size=(3, 3), least_drawn=0)
-
-
-@pytest.mark.parametrize("parallel", [False, True])
-def test_touching_supersegments_leave_no_gap(runtime, worst, parallel):
-    """A hundred that touch are one: where each ends the next begins, to the last bit."""
-    camera = EYE.replace(parallel_projection=parallel)
-    ends = np.linspace(0, 2, 101, dtype=np.float32)
-    vdi = slabs_vdi(
-        camera, np.stack([ends[:-1], ends[1:]], axis=1), 0.02, window=(4, 3), bounds=BOUNDS,
-        depth_origin=9.0,
-    )  # fmt: skip
-    one = slabs_vdi(camera, [[0, 2]], 2.0, window=(4, 3), bounds=BOUNDS, depth_origin=9.0)
-    for new in AROUND:
-        check_views(runtime, worst, vdi, [new])
-        images = [render_vdi(each, new, WINDOW, device=runtime) for each in (vdi, one)]
-        # Thicknesses are those of stored depths, each rounded by 2^-23: 1e-5 of a fiftieth
-        np.testing.assert_allclose(*images, atol=2e-5)
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -33,24 +32,6 @@ REACH = np.linalg.norm(BOX[:, 1] - CENTRE)
 
 def vdi_from(runtime, camera, size=WINDOW):
     return generate_vdi(VOLUME, camera, size, transfer(), max_supersegments=8, device=runtime)
-
-
-def moved_by_an_ulp(camera):
-    """The same view with one coordinate of the eye moved to the next float64, or float32."""
-    position = np.array(camera.position)
-    for axis, dtype in itertools.product(range(3), (np.float64, np.float32)):
-        eye = position.copy()
-        eye[axis] = np.nextafter(dtype(eye[axis]), dtype(np.inf))
-        yield camera.replace(position=eye)
-    yield camera.replace(view_angle=float(np.nextafter(camera.view_angle, 180)))
-    yield camera.replace(view_up=np.nextafter(camera.view_up, 2))
-
-
-@pytest.mark.parametrize("parallel", [False, True])
-def test_v_n_is_v_o_or_off_by_an_ulp(runtime, worst, parallel):
-    camera = view(VOLUME, parallel=parallel)
-    views = [camera, *moved_by_an_ulp(camera)]
-    check_views(runtime, worst, vdi_from(runtime, camera), views)
 
 
 def along(vdi, first, last):
@@ -102,17 +83,6 @@ def test_rays_along_axes_borders_and_corners(runtime, worst, parallel):
         check_views(runtime, worst, vdi, [along(vdi, first, last)], size=(1, 1), least_drawn=1)
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("roll", [0, 90, 33])
-@pytest.mark.parametrize("parallels", list(itertools.product([False, True], repeat=2)), ids=str)
-def test_parallel_in_both_roles_right_angles_and_roll(runtime, worst, parallels, roll):
-    own, new = (view(VOLUME, parallel=parallel) for parallel in parallels)
-    angle = math.radians(roll)
-    new = new.replace(view_up=(math.sin(angle), math.cos(angle), 0))
-    vdi = vdi_from(runtime, own)
-    check_views(runtime, worst, vdi, [new.azimuth(a) for a in (0, 90, 180, 270)])
-
-
 EYES = {
     "centre": (CENTRE, CENTRE + np.array([0, 0, 1])),
     "face": ([CENTRE[0], CENTRE[1], BOX[2, 1]], CENTRE),
@@ -136,19 +106,6 @@ def test_eyes_in_the_volume(runtime, worst, place):
     check_views(runtime, worst, vdi_from(runtime, outside), inward)
 
 
-def test_at_v_o_s_eye_and_on_its_eye_plane(runtime, worst):
-    own = view(VOLUME)
-    right, up, forward = own.axes
-    eye = np.array(own.position)
-    vdi = vdi_from(runtime, own)
-    views = [own.replace(focal_point=own.focal_point + 0.1 * REACH * d) for d in (right, up)]
-    for step in (5 * right, -3 * up, 4 * right + 3 * up, -20 * forward):
-        position = eye + step * REACH
-        angle = 2 * math.degrees(math.atan(REACH / np.linalg.norm(CENTRE - position)))
-        views.append(own.replace(position=position, focal_point=CENTRE, view_angle=angle))
-    check_views(runtime, worst, vdi, views)
-
-
 def lens(angle):
     """A view whose half angle holds half a diagonal; from inside where it is wide."""
     distance = 1 / math.tan(math.radians(angle) / 2)
@@ -165,7 +122,7 @@ def test_fields_of_view(runtime, worst, own, new):
     check_scene(runtime, worst, VOLUME, transfer(), camera, views, size=size, least_drawn=1)
 
 
-@pytest.mark.parametrize("size", [(101, 1), (1, 101), (301, 3), (1, 1)], ids=str)
+@pytest.mark.parametrize("size", [(1, 101), (301, 3), (1, 1)], ids=str)
 def test_windows_of_extreme_aspect(runtime, worst, size):
     """The volume fills the shorter edge, or it would be a fraction of a pixel high."""
     camera = view(VOLUME).replace(use_horizontal_view_angle=size[0] < size[1])
@@ -176,8 +133,8 @@ def test_windows_of_extreme_aspect(runtime, worst, size):
 @pytest.mark.parametrize(
     ("distance", "origin"),
     [
-        *((distance, 1.0) for distance in (1.01, 2.9, 2.99, 3.0, 3.01, 3.1, 1e3, 1e6)),
-        *((distance, 0.0) for distance in (2.99, 3.01, 1e3)),
+        *((distance, 1.0) for distance in (1.01, 2.99, 3.01, 1e6)),
+        (3.01, 0.0),
     ],
 )
 def test_both_depth_coordinates_at_the_border_of_their_choice(runtime, worst, distance, origin):

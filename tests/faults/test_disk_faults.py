@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -15,9 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from faulty_disk import vdi_number, watch_new_files
-from fresh_python import run_python
-from rewriting import declaring
-from strategies import random_vdi
 
 from pyvista_vdi import io
 from pyvista_vdi.errors import VDIFileError
@@ -51,10 +46,10 @@ def interrupt():
     signal.raise_signal(signal.SIGINT)
 
 
-@pytest.mark.every(3)
-@formats
+@posix
 @pytest.mark.parametrize(
-    ("fault", "old"), [(fill, True), (fill, False), pytest.param(interrupt, True, marks=posix)]
+    ("suffix", "fault", "old"),
+    [(".vdi", fill, True), (".vdi", interrupt, True), (".html", fill, False)],
 )
 def test_a_disk_that_fills_and_ctrl_c_at_each_write(suffix, fault, old, monkeypatch, tmp_path):
     path, left = tmp_path / f"a{suffix}", []
@@ -107,25 +102,6 @@ def test_a_disk_that_fails_at_the_last_steps(suffix, step, monkeypatch, tmp_path
     assert names_in(tmp_path) == [path.name]
 
 
-@posix
-@formats
-def test_a_limit_of_the_size_of_files(suffix, tmp_path):
-    """What a quota or a full file system does: the kernel itself refuses the write."""
-    import resource
-
-    path = vdi_number(1).save(tmp_path / f"a{suffix}")
-    before, large = path.read_bytes(), random_vdi(np.random.default_rng(2), window=(40, 30))
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
-    try:
-        with pytest.raises(VDIFileError, match="could not be written: File too large"):
-            large.save(path, **options(suffix, "none"))
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert path.read_bytes() == before
-    assert names_in(tmp_path) == [path.name]
-
-
 #: A program that saves, and one that saves until it is told to end.
 SAVE = """
 import select, sys, time
@@ -165,15 +141,13 @@ def killed_at(moment, path):
         process.communicate(timeout=PATIENCE)
 
 
-@pytest.mark.every(3)
 @posix
-@formats
 @pytest.mark.parametrize(
     "moments", [(0, 7, 9999), pytest.param((*range(0, 40, 3), 9999), marks=pytest.mark.slow)]
 )
-def test_a_process_that_is_killed_while_it_saves(suffix, moments, tmp_path):
+def test_a_process_that_is_killed_while_it_saves(moments, tmp_path):
     """SIGKILL at any moment: the old file is intact, or the new one is whole."""
-    path = vdi_number(1).save(tmp_path / f"a{suffix}")
+    path = vdi_number(1).save(tmp_path / "a.vdi")
     before = path.read_bytes()
     outcomes = set()
     for moment in moments:
@@ -193,11 +167,9 @@ def test_a_process_that_is_killed_while_it_saves(suffix, moments, tmp_path):
     assert outcomes >= {"now", "saved"}
 
 
-@pytest.mark.every(3)
-@formats
-def test_two_processes_that_save_to_one_name(suffix, tmp_path):
+def test_two_processes_that_save_to_one_name(tmp_path):
     """Whoever reads meanwhile finds one of their files, whole."""
-    path = vdi_number(1).save(tmp_path / f"a{suffix}", **options(suffix))
+    path = vdi_number(1).save(tmp_path / "a.vdi")
     processes = [saving(SAVE_OFTEN, path, seed) for seed in (1, 2)]
     known, seen = [vdi_number(1).counts, vdi_number(2).counts], []
 
@@ -227,79 +199,3 @@ def test_two_processes_that_save_to_one_name(suffix, tmp_path):
             process.stdout.close()
     assert [process.returncode for process in processes] == [0, 0]
     assert names_in(tmp_path) == [path.name]
-
-
-READ = """
-import json, sys
-from pyvista_vdi import io
-from pyvista_vdi.errors import VDIError
-def read(path):
-    for function in (io.read_info, io.read):
-        try:
-            function(path)
-        except VDIError:
-            pass
-files = json.loads(sys.argv[1])
-for path in files:
-    read(path)  # imports what it needs
-events = []
-def heard(event, arguments):
-    if event in ("open", "exec", "compile", "import", "subprocess.Popen", "os.system",
-                 "pickle.find_class", "marshal.loads", "os.remove", "os.rename",
-                 "os.mkdir", "socket.connect", "ctypes.dlopen", "os.exec", "os.fork"):
-        events.append((event, [str(a) for a in arguments]))
-sys.addaudithook(heard)
-for path in files:
-    read(path)
-print(json.dumps(events))
-"""
-
-
-def test_reading_opens_nothing_else_and_runs_nothing(tmp_path):
-    """Python's audit events of reading every file that fuzzing keeps, and whole ones."""
-    files = [str(vdi_number(1).save(tmp_path / f"a{suffix}")) for suffix in io.suffixes()]
-    for path in sorted((SUPPORT.parent / "fuzz" / "corpus" / "vdi_bytes").iterdir()):
-        files.append(shutil.copy(path, tmp_path / (path.name + ".vdi")))
-    done = run_python(READ, json.dumps([str(path) for path in files]))
-    assert done.returncode == 0, done.stderr
-    events = json.loads(done.stdout)
-    assert events
-    for event, arguments in events:
-        assert event == "open", (event, arguments)
-        assert arguments[0] in map(str, files), arguments
-        assert arguments[1] in ("r", "rb"), arguments
-
-
-READ_WITHIN = """
-import json, resource, sys
-from pathlib import Path
-from pyvista_vdi import io
-from pyvista_vdi.errors import VDIFileError
-files = json.loads(sys.argv[1])
-def refused(path):
-    try:
-        io.read(path)
-    except VDIFileError as error:
-        return str(error)
-    raise AssertionError(path)
-refused(files[0]), refused(files[-1])  # imports what it needs
-pages = int(Path("/proc/self/statm").read_text().split()[0])
-limit = pages * resource.getpagesize() + 400 * 2**20
-resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-for path in files:
-    print(refused(path))
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="RLIMIT_AS")
-def test_hostile_files_stay_within_a_limit_of_memory(tmp_path):
-    """The system's own limit: 400 MiB beyond what the process has when it begins to read."""
-    files = []
-    for i, (n, window) in enumerate([(10**12, [9, 9]), (0, [65536, 65536]), (2**47, [1, 1])]):
-        for compression in ("none", "zstd", "lz4"):
-            path = vdi_number(1).save(tmp_path / f"{i}_{compression}.vdi", compression=compression)
-            path.write_bytes(declaring(path.read_bytes(), n, window))
-            files.append(str(path))
-    done = run_python(READ_WITHIN, json.dumps(files))
-    assert done.returncode == 0, done.stderr
-    assert len(done.stdout.splitlines()) == len(files)

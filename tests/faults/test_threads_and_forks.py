@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawing import generate_vdi, raycast_volume, render_vdi
+from drawing import generate_vdi, render_vdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume, state_of
 from fresh_python import run_python
 from strategies import random_vdi
@@ -71,124 +71,6 @@ def test_one_vdi_drawn_by_many_threads(runtime):
     assert media(state_of(runtime)) == 1 + media(before)
     del shared, draw
     assert state_of(runtime) == before
-
-
-def test_threads_that_do_different_things(runtime):
-    """Generating, rendering, volume rendering, saving and reading, all at once."""
-    volume = fresh_volume()
-    made = generate_vdi(volume, CAMERA, WINDOW, TRANSFER, device=runtime)
-    image = render_vdi(made, CAMERA.azimuth(30), device=runtime)
-    picture = raycast_volume(volume, CAMERA, WINDOW, TRANSFER, device=runtime)
-
-    def generate():
-        assert generate_vdi(volume, CAMERA, WINDOW, TRANSFER, device=runtime).equals(made)
-
-    def draw():
-        np.testing.assert_array_equal(render_vdi(made, CAMERA.azimuth(30), device=runtime), image)
-
-    def draw_volume():
-        drawn = raycast_volume(volume, CAMERA, WINDOW, TRANSFER, device=runtime)
-        np.testing.assert_array_equal(drawn, picture)
-
-    with ThreadPoolExecutor(6) as pool:
-        for future in [pool.submit(f) for f in (generate, draw, draw_volume) * 10]:
-            future.result(PATIENCE)
-
-
-TWO_PLOTTERS = """
-from concurrent.futures import ThreadPoolExecutor
-import pyvista as pv
-from strategies import random_vdi
-
-vdi = random_vdi(np.random.default_rng(4), max_window=(40, 30))
-corners = np.reshape(vdi.bounds, (3, 2))
-centre, size = corners.mean(axis=1), np.ptp(corners, axis=1).max()
-
-def pictures(first):
-    plotter = pv.Plotter(window_size=(120, 90), off_screen=True)
-    plotter.add_vdi(vdi, regenerate="never", show_scalar_bar=False)
-    shown = []
-    for angle in np.radians(np.arange(first, first + 120, 10)):
-        eye = centre + 3 * size * np.array([np.cos(angle), np.sin(angle), 0.3])
-        plotter.camera_position = (tuple(eye), tuple(centre), (0, 0, 1))
-        shown.append(plotter.screenshot(return_img=True))
-    plotter.close()
-    return shown
-
-alone = [pictures(0), pictures(90)]
-assert len(np.unique(alone[0][0])) > 10
-with ThreadPoolExecutor(2) as pool:
-    together = list(pool.map(pictures, (0, 90)))
-assert np.array_equal(alone, together)
-print("the same")
-"""
-
-
-@pytest.mark.slow
-def test_two_plotters_in_two_threads(default_runtime):
-    """Each thread makes, uses and closes its own window; the VDI is shared."""
-    pytest.importorskip("pyvista")
-    assert finished(TWO_PLOTTERS) == "the same\n"
-
-
-MANY_VDIS = """
-import gc, threading
-import pyvista as pv
-from pyvista_vdi.vtk_pipeline.vtk import vtkAssembly, vtkObjectBase
-
-def grid(number):
-    grid = pv.ImageData(dimensions=(6, 6, 6), origin=(0.4 * number, 0.3 * number, 0))
-    grid["v"] = np.arange(216, dtype=np.uint8)
-    return grid
-
-def scene(columns):
-    # No actor is kept here, nor by PyVista but for the one added last
-    plotter = pv.Plotter(shape=(1, columns), off_screen=True, window_size=(60, 45))
-    for number in range(8):
-        plotter.subplot(0, number % columns)
-        plotter.add_vdi(grid(number), name=str(number), show_scalar_bar=False)
-    assembly = vtkAssembly()
-    assembly.AddPart(plotter.add_vdi(grid(8), name="8", show_scalar_bar=False))
-    plotter.remove_actor("8")
-    plotter.add_actor(assembly)
-    plotter.volume = None
-    plotter.show(auto_close=False)
-    for number in range(4):
-        plotter.camera.azimuth += 5
-        plotter.render()
-        plotter.remove_actor(str(number))
-    plotter.clear()
-    plotter.add_vdi(grid(0), show_scalar_bar=False)
-    plotter.render()
-    plotter.close()
-
-def alive():
-    gc.collect()
-    return sum(issubclass(type(each), vtkObjectBase) for each in gc.get_objects())
-
-def collect():
-    while not ended.wait(0.05):
-        gc.collect()
-
-scene(1)
-before, ended = alive(), threading.Event()
-collector = threading.Thread(target=collect, daemon=True)
-collector.start()
-gc.set_threshold(1, 1, 1)
-for turn in range(int(sys.argv[1])):
-    scene(1 + turn % 2)
-ended.set()
-collector.join()
-assert alive() <= before
-print("nothing is left")
-"""
-
-
-@pytest.mark.parametrize("turns", [2, pytest.param(30, marks=pytest.mark.slow)])
-def test_many_vdis_while_python_collects(default_runtime, turns):
-    """At any allocation, and in another thread: VTK is asked for nothing within a collection."""
-    pytest.importorskip("pyvista")
-    assert finished(MANY_VDIS, str(turns)) == "nothing is left\n"
 
 
 # -- forks -----------------------------------------------------------------------------------------

@@ -59,7 +59,6 @@ def _import_instrumented() -> None:
         raise SystemExit('atheris is not installed: pip install "pyvista-vdi[fuzz]"') from None
     with atheris.instrument_imports(include=["pyvista_vdi"]):
         import pyvista_vdi.plotting.classify  # noqa: F401
-        import pyvista_vdi.vtk_pipeline.filters.convert  # noqa: F401
 
 
 def _targets() -> dict[str, Callable[[bytes], None]]:

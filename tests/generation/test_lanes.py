@@ -11,97 +11,67 @@ from drawing import generate_vdi
 from march_ways import CENTER, VIEWS, WINDOW, both_ways, transfer_for, volume_of
 from settings import with_settings
 
-from pyvista_vdi import Volume, render_volume
+from pyvista_vdi import Light, Shading, render_volume
 
-FULL = Volume(np.maximum(volume_of(np.uint8).array, 120))
 ENDS = np.random.default_rng(3).uniform(60, 160, WINDOW[::-1]).astype(np.float32)
 ENDS[:5] = np.inf
-PARTS = [
-    {"clipping_planes": [(*CENTER, 1, 0.5, 0.2)]},
-    {"cropping": ((10, 30, 10, 30, 10, 30), "fence")},
-    {"opaque_depth": ENDS},
-]
+PLANES = {"clipping_planes": [(*CENTER, 1, 0.5, 0.2)]}
+CROPPED = {"cropping": ((10, 30, 10, 30, 10, 30), "fence")}
+DEPTH, FINE = {"opaque_depth": ENDS}, {"sample_distance": 0.05}
+LAMP = {"lights": [Light("scene", (200, 300, 100), CENTER, positional=True, cone_angle=120.0)]}
 
-
-@pytest.fixture
-def check(monkeypatch, runtime):
-    """Make something of a volume by both forms of a kernel, and compare the bits."""
-
-    def checked(make, kernel, volume, interpolation="nearest", view="all of it", **options):
-        arguments = (volume, VIEWS[view](volume), WINDOW)
-        function = transfer_for(volume, interpolation)
-        if make is generate_vdi:
-            arguments += (function,)
-        else:
-            options = with_settings(transfer_function=function, **options)
-        found, expected, launches = both_ways(
-            monkeypatch, runtime, kernel, lambda: make(*arguments, device=runtime, **options)
-        )
-        assert launches[0] == launches[1] > 0
-        if make is generate_vdi:
-            assert found.equals(expected)
-            assert found.n_supersegments > (100 if view == "past it" else 1500)
-        else:
-            assert found.tobytes() == expected.tobytes()
-            assert found[..., 3].max() > 0.1
-
-    return checked
-
-
-MAKERS = [(generate_vdi, "march_lists"), (render_volume, "render_volume")]
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize(("make", "kernel"), MAKERS)
-@pytest.mark.parametrize("interpolation", ["nearest", "linear"])
-@pytest.mark.parametrize("dtype", [np.uint8, np.int8, np.uint16, np.int16, np.float32, np.int32])
-def test_types(check, make, kernel, dtype, interpolation):
-    check(make, kernel, volume_of(dtype), interpolation)
-
-
-@pytest.mark.parametrize(("make", "kernel"), MAKERS)
-@pytest.mark.parametrize("view", VIEWS)
-def test_views(check, make, kernel, view):
-    check(make, kernel, volume_of(np.uint8), view=view)
-    check(make, kernel, FULL, view=view)  # without empty blocks
+#: What a look has beside colours and opacities.
+PLAIN, GRADIENT = {}, {"gradient_opacities": [0.2, 1, 0.3], "gradient_range": (2, 30)}
+SHADED = {"shading": Shading(0.2, 0.7, 0.4, 8.0)}
 
 
 @pytest.mark.parametrize(
-    "options",
+    ("kernel", "dtype", "interpolation", "view", "look", "blanked", "options"),
     [
-        {"sample_distance": 0.1},  # many steps a voxel, in several chunks
-        {"sample_distance": 1.7},
-        {"max_supersegments": 5, "tolerance": 0.05},
-        {"max_supersegments": 200},
-        {"view_cone": 0.0},
-        {"criterion": "homogeneity"},
-        {"memory_limit": "4 MiB"},  # slices of four rows
+        ("march_lists", "uint8", "nearest", "all of it", PLAIN, False, FINE),
+        ("march_lists", "int8", "linear", "parallel", GRADIENT, False, {}),
+        ("march_lists", "uint16", "linear", "along an axis", SHADED, False, {"view_cone": 0.0}),
+        ("march_lists", "float32", "nearest", "from inside", GRADIENT | SHADED, True, LAMP),
+        ("march_lists", "uint8", "linear", "past it", PLAIN, True, {"memory_limit": "4 MiB"}),
+        ("march_lists", "int32", "linear", "all of it", PLAIN, False, {"criterion": "homogeneity"}),
+        ("shorten_lists", "uint8", "linear", "all of it", PLAIN, True, {"tolerance": 0.05}),
+        ("shorten_lists", "float32", "nearest", "parallel", PLAIN, False, {"max_supersegments": 5}),
+        ("render_volume", "uint8", "linear", "all of it", PLAIN, False, CROPPED),
+        ("render_volume", "int16", "nearest", "all of it", SHADED | GRADIENT, False, PLANES),
+        ("render_volume", "float32", "linear", "along an axis", SHADED, True, DEPTH | LAMP),
+        ("render_volume", "uint16", "linear", "parallel", GRADIENT, False, FINE),
+        ("render_volume", "int32", "nearest", "past it", PLAIN, True, {"early_termination": False}),
+        ("maximum", "uint8", "linear", "all of it", PLAIN, False, PLANES),
+        ("minimum", "float32", "nearest", "parallel", PLAIN, True, {}),
+        ("average", "float32", "linear", "from inside", PLAIN, False, CROPPED),
+        ("additive", "int16", "linear", "all of it", PLAIN, True, DEPTH),
     ],
-    ids=str,
-)
-@pytest.mark.parametrize("kernel", ["march_lists", "shorten_lists"])
-def test_vdis(check, kernel, options):
-    if kernel == "march_lists" or "criterion" not in options:  # which shortens nothing here
-        check(generate_vdi, kernel, volume_of(np.uint8, spacing=(1, 0.8, 1.3)), **options)
+)  # fmt: skip
+def test_blocks_of_rays_give_the_same_bits(
+    monkeypatch, runtime, kernel, dtype, interpolation, view, look, blanked, options
+):
+    volume = volume_of(dtype, spacing=(1, 0.8, 1.3))
+    if blanked:  # a third of the octants
+        octants = np.random.default_rng(4).integers(0, 256, (2, *volume.array.shape), np.uint8)
+        volume.blanked = octants[0] & octants[1]
+    function = transfer_for(volume, interpolation, **look)
+    arguments = (volume, VIEWS[view](volume), WINDOW)
 
+    def make():
+        if kernel in ("march_lists", "shorten_lists"):
+            return generate_vdi(*arguments, function, device=runtime, **options)
+        shown = with_settings(transfer_function=function, **options)
+        if kernel != "render_volume":
+            shown["blending"] = kernel
+        return render_volume(*arguments, device=runtime, **shown)
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        *PARTS,
-        {"sample_distance": 0.03},  # opacity is summed up from 0
-        {"early_termination": False},
-        {"opacity_multiplier": 0.3},
-    ],
-    ids=lambda options: next(iter(options)),
-)
-def test_pictures(check, options):
-    check(render_volume, "render_volume", volume_of(np.uint8), "linear", **options)
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize("blending", ["maximum", "minimum", "average", "additive"])
-@pytest.mark.parametrize("options", [{}, *PARTS], ids=lambda options: next(iter(options), "all"))
-def test_projections(check, blending, options):
-    volume = volume_of(np.uint8 if options else np.float32)
-    check(render_volume, "project", volume, "linear", blending=blending, **options)
+    found, expected, launches = both_ways(
+        monkeypatch, runtime, kernel if "_" in kernel else "project", make
+    )
+    assert launches[0] == launches[1] > 0
+    if kernel in ("march_lists", "shorten_lists"):
+        assert found.equals(expected)
+        assert found.n_supersegments > (100 if view == "past it" else 1000)
+    else:
+        assert found.tobytes() == expected.tobytes()
+        assert found[..., 3].max() > 0.1

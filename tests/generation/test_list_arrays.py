@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from drawing import generate_vdi
@@ -11,9 +9,6 @@ from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
 
 from pyvista_vdi import Camera, render
 from pyvista_vdi.device import GrowingArray, Runtime
-from pyvista_vdi.generation.march import March
-from pyvista_vdi.generation.slices import Slices
-from pyvista_vdi.model.options import GenerationOptions
 
 #: Looks past the volume, so that first all and then no lists have something in them.
 HALF_BESIDE = Camera((3.5, -4.0, 30), (3.5, -4.0, 3.5), (0, 1, 0))
@@ -31,7 +26,7 @@ def make(runtime):
 
 
 @pytest.mark.parametrize("camera", [CAMERA, HALF_BESIDE], ids=["inside", "half beside"])
-@pytest.mark.parametrize("memory", ["as it is", "copied", "little", "least"])
+@pytest.mark.parametrize("memory", ["copied", "little", "least"])
 def test_slices_make_the_same_vdi_however_memory_is_had(monkeypatch, runtime, make, camera, memory):
     whole = make(camera)
     assert whole.n_supersegments > 100
@@ -49,34 +44,6 @@ def test_slices_make_the_same_vdi_however_memory_is_had(monkeypatch, runtime, ma
     assert make(camera, **FOUR_ROWS).equals(whole)
     in_place = runtime.in_place_alignment is not None and memory in ("little", "least")
     assert len(grown) >= 2 or not in_place
-
-
-def test_a_slice_is_marched_before_the_sum_of_the_one_before_is_waited_for(
-    monkeypatch, runtime, make
-):
-    if runtime.in_place_alignment is None:
-        pytest.skip("the device has room for all lists")
-    done = []
-    chunks, later = March.chunks, Runtime.download_later
-
-    def noted_chunks(self, part):
-        done.append("march")
-        return chunks(self, part)
-
-    def noted_later(self, buffer, out, *, first=0):
-        wait = later(self, buffer, out, first=first)
-
-        def noted_wait():
-            done.append("wait")
-            wait()
-
-        return noted_wait
-
-    monkeypatch.setattr(March, "chunks", noted_chunks)
-    monkeypatch.setattr(Runtime, "download_later", noted_later)
-    make(CAMERA, **FOUR_ROWS)
-    n = -(-WINDOW[1] // 4)
-    assert done == ["march", *["march", "wait"] * (n - 1), "wait"]
 
 
 @pytest.mark.parametrize("camera", [CAMERA, HALF_BESIDE], ids=["inside", "half beside"])
@@ -108,18 +75,3 @@ def test_lists_stay_in_a_devices_own_memory_until_somebody_wants_them(
     assert runtime.allocated < before
     assert vdi.equals(wanted)
     assert vdi.with_precision("8-byte").equals(wanted.with_precision("8-byte"))
-
-
-def test_a_gpu_makes_larger_slices():
-    """As many rays at a time as a sixteenth of its memory holds, but no more than are allowed."""
-
-    def rows(is_cpu, memory, **options):
-        device = SimpleNamespace(is_cpu=is_cpu, info=SimpleNamespace(global_memory=memory))
-        return Slices(device, (1280, 720), GenerationOptions(**options)).rows
-
-    on_cpu = rows(True, 2**37)
-    assert on_cpu < 720 / 20
-    assert rows(False, 2**37) == 720
-    assert rows(False, 2**33) == pytest.approx(on_cpu * 2**29 / (96 * 2**20), abs=8)
-    assert rows(False, 2**30) == on_cpu
-    assert rows(False, 2**37, memory_limit="64 MiB") < on_cpu

@@ -25,10 +25,9 @@ from recorded_runs import (
     random_records,
     random_segments,
 )
+from reference import compositing
+from reference.compositing import Segment
 from reference.shading import cut_where_unlike
-
-from pyvista_vdi.model import compositing
-from pyvista_vdi.model.compositing import Segment
 
 FILE = "record_functions.cl"
 #: Ways of shortening a record.
@@ -139,9 +138,7 @@ def errors(call, a, b, per_reference=1.0, hidden_weight=0.5):
     return call(FILE, "merge_errors", len(a), a, b, *how, call.empty(len(a)))
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("per_reference", [0.02, 1.0, 50.0])
-@pytest.mark.parametrize("hidden_weight", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize(("per_reference", "hidden_weight"), [(0.02, 0.5), (50.0, 0.0)])
 def test_merge_error_is_the_growth_of_the_sum_of_squares(call, per_reference, hidden_weight):
     segments, a, b = pairs(44)
     found = errors(call, a, b, per_reference, hidden_weight)
@@ -162,50 +159,7 @@ def test_merge_error_is_the_growth_of_the_sum_of_squares(call, per_reference, hi
     assert (found >= 0).all()
 
 
-@pytest.mark.parametrize("even", [True, False])
-def test_merging_parts_of_one_medium_costs_nothing(call, even):
-    rng = np.random.default_rng(45)
-    lengths, taus = rng.uniform(0.1, 10, 500), 10 ** rng.uniform(-6, 1, 500)
-    cuts = lengths * (0.5 if even else rng.uniform(0.01, 0.99, 500))
-    runs = np.array(
-        [
-            as_runs(compositing.split(Segment(0.0, length, rng.random(3), tau), cut))
-            for length, tau, cut in zip(lengths, taus, cuts, strict=True)
-        ]
-    )
-    runs[:, :, TRANSMITTANCE] = 1
-    a, b = (np.ascontiguousarray(runs[:, i]) for i in (0, 1))
-    if even:  # the same numbers to the last bit but for the place
-        b[:, [TAU, 4, 5, 6, OPACITY]] = a[:, [TAU, 4, 5, 6, OPACITY]]
-    length = runs[:, 1, BACK] - runs[:, 0, FRONT]
-    # Features differ by their rounding: 24 EPS of at most 2, squared, over a quarter length.
-    # Halves: only their lengths can differ, by the rounding of the far end less the middle
-    assert (errors(call, a, b) <= (48 * EPS) ** 2 * length / 4).all()
-
-
-@pytest.mark.parametrize("threshold", [1e-6, 1e-3, 0.1, 1e30])
-def test_merge_within(call, threshold):
-    rng = np.random.default_rng(42)
-    many = [Segment(k, k + 1, rng.random(3), 10 ** -rng.uniform(1, 6)) for k in range(1000)]
-    records = [as_runs(s) for s in [*random_records(61, 64, 40), many]]
-    found, _ = shortened(call, WITHIN, records, 1, threshold=threshold)
-    for before, after in zip(records, found, strict=True):
-        check_shortened(before, after)
-        assert threshold < 1e30 or len(after) == 1
-    left = sum(map(len, found[:-1])) / sum(map(len, records[:-1]))
-    # Unlike media: next to nothing at a millionth, something at a tenth
-    assert {1e-6: left > 0.99, 1e-3: left < 0.99, 0.1: left < 0.8}.get(threshold, True), left
-
-
-def test_merge_within_takes_what_is_homogeneous_and_no_more(call):
-    """Three media in ten parts each: three runs are left, cut where the media change."""
-    media = [((1.0, 0, 0), 0.5), ((0, 1.0, 0), 0.5), ((0, 0, 0), 3.0)]
-    parts = [Segment(k, k + 1, np.array(media[k // 10][0]), media[k // 10][1]) for k in range(30)]
-    (after,), _ = shortened(call, WITHIN, [as_runs(parts)], 1, threshold=1e-6, hidden_weight=1.0)
-    np.testing.assert_array_equal(after[:, [FRONT, BACK]], [[0, 10], [10, 20], [20, 30]])
-
-
-@pytest.mark.parametrize("limit", [1, 2, 20, 39])
+@pytest.mark.parametrize("limit", [2, 39])
 def test_make_room(call, limit):
     records = [as_runs(s) for s in random_records(62, 64, 100)]
     found, thresholds = shortened(call, ROOM, records, limit)
@@ -225,9 +179,7 @@ def test_make_room(call, limit):
         assert np.mean(long) > limit / 4
 
 
-@pytest.mark.every(5)
-@pytest.mark.parametrize("hidden_weight", [0.0, 0.5, 1.0])
-@pytest.mark.parametrize("limit", [1, 2, 5, 20])
+@pytest.mark.parametrize(("limit", "hidden_weight"), [(2, 0.5), (20, 0.0)])
 def test_merge_to_limit_is_greedy(call, limit, hidden_weight):
     segments = random_records(63, 48, 45)
     records = [as_runs(s) for s in segments]
@@ -246,7 +198,7 @@ def test_merge_to_limit_is_greedy(call, limit, hidden_weight):
     assert clear > len(records) / 2, clear
 
 
-@pytest.mark.parametrize("limit", [1, 2, 5, 20])
+@pytest.mark.parametrize("limit", [2, 20])
 def test_homogeneity_cuts_where_the_reference_does(call, limit):
     records = [as_runs(s) for s in random_records(71, 64, 40)]
     found, _ = shortened(call, ALIKE, records, limit, per_reference=0.7)
@@ -264,25 +216,14 @@ def test_homogeneity_cuts_where_the_reference_does(call, limit):
     assert same >= 0.9 * len(records), same
 
 
-@pytest.mark.parametrize("way", [LIMIT, ALIKE])
-def test_what_differs_most_is_kept(call, way):
-    """Dense red in thin grey survives down to three runs, and no threshold need be told."""
-    parts = [Segment(k, k + 1, np.full(3, 0.5 * (1 + 1e-3 * (k % 3))), 0.01) for k in range(60)]
-    parts[30] = Segment(30, 31, np.array([1.0, 0, 0]), 2.0)
-    ((after,), _) = shortened(call, way, [as_runs(parts)], 3)
-    np.testing.assert_array_equal(after[:, [FRONT, BACK]], [[0, 30], [30, 31], [31, 60]])
-
-
 @pytest.mark.extremes
-@pytest.mark.every(2)
 @pytest.mark.parametrize("way", [WITHIN, ROOM, LIMIT, ALIKE])
-@pytest.mark.parametrize("limit", [1, 7, 39])
+@pytest.mark.parametrize("limit", [7])
 def test_any_finite_record_is_shortened(call, way, limit):
     """It ends (pytest's timeout says so), within the limit, in order, with the ends it had.
 
     Errors are finite, or there would be no least one.
     """
-    limit = min(limit, 39)
     for per_reference in (1e-30, 1.0, 1e30):
         how = {"per_reference": per_reference, "hidden_weight": 0.25}
         found, _ = shortened(call, way, list(EXTREMES.values()), limit, **how)

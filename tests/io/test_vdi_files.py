@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import tracemalloc
 import zipfile
 import zlib
 from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,9 +19,8 @@ from strategies import random_vdi
 
 from pyvista_vdi import VDI, Camera, io
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-from pyvista_vdi.io.vdi_file import chunks
-from pyvista_vdi.io.vdi_file.coarse import coarser
 from pyvista_vdi.io.vdi_file.layout import CHUNK_ROWS, INDEX_DTYPE
+from pyvista_vdi.io.vdi_file.writer import coarser
 
 CODECS = ("lz4", "zstd", "deflate", "none")
 PRECISIONS = ("exact", "8-byte")
@@ -109,57 +106,6 @@ def test_chunks_that_end_within_a_list(precision, tmp_path):
         assert getattr(read, name).ctypes.data % 4096 == 0, name
 
 
-@pytest.mark.parametrize("precision", PRECISIONS)
-@pytest.mark.parametrize("count", [0, 1, 255, 256, 70000])
-def test_lists_of_any_length(count, precision, tmp_path):
-    if precision == "8-byte":
-        count = min(count, 16383)  # as many depths as there are codes
-    front = np.arange(count) * 2 + 1
-    vdi = VDI(
-        *(VIEW, (2, 1), [0, count, count], front, front + 1),
-        *(np.full((count, 3), 0.5), np.ones(count), (0, 1, 0, 1, 0, 1)),
-    ).with_precision(precision)
-    back = io.read(vdi.save(tmp_path / "a.vdi"))
-    assert back.equals(vdi)
-    assert (back.precision, back.n_supersegments) == (precision, count)
-
-
-def test_negative_depths_and_signed_zeros(tmp_path):
-    view, bounds = VIEW.replace(parallel_projection=True), (0, 1, 0, 1, 0, 1)
-    front, back, depths = [-2.0, -0.0, 1e-38], [-1.0, 1e-40, 3e38], [0.0, -0.0, 1e30]
-    vdi = VDI(view, (1, 1), [0, 3], front, back, np.zeros((3, 3)), depths, bounds)
-    read = io.read(vdi.save(tmp_path / "a.vdi"))
-    for name in ("front", "back", "optical_depth"):
-        assert getattr(read, name).tobytes() == getattr(vdi, name).tobytes()
-
-
-def test_the_same_vdi_gives_the_same_bytes_by_any_number_of_threads(tmp_path, monkeypatch):
-    vdi = large_vdi()
-    first = io.write(vdi, tmp_path / "a.vdi").read_bytes()
-    monkeypatch.setattr(chunks, "cpu_count", lambda: 1)
-    assert io.write(vdi, tmp_path / "b.vdi").read_bytes() == first
-
-
-def test_save_takes_text_overwrites_and_makes_metadata_of_numpy_plain(tmp_path):
-    path = str(tmp_path / "a.vdi")
-    small_vdi(1).save(path)
-    vdi = large_vdi((4, 4), metadata={"a": np.float32(0.5), "b": np.arange(3)})
-    vdi.save(path)
-    assert io.read(path).equals(vdi)
-    assert io.read(path).metadata == {"a": 0.5, "b": [0, 1, 2]}
-    assert names_in(tmp_path) == ["a.vdi"]
-
-
-def test_info_says_what_the_vdi_is(tmp_path):
-    vdi = large_vdi((40, 30), metadata={"tolerance": 0.5}, depth_origin=1.0)
-    info = io.read_info(io.write(vdi, tmp_path / "a.vdi", compression="lz4"))
-    assert (info.window_size, info.n_supersegments) == ((40, 30), 2400)
-    assert (info.camera, info.bounds, info.depth_origin) == (vdi.camera, vdi.bounds, 1.0)
-    assert (info.metadata, info.codec, info.format_version) == ({"tolerance": 0.5}, "lz4", 2)
-    assert info.memory_bytes == vdi.nbytes
-    assert info.file_bytes == (tmp_path / "a.vdi").stat().st_size
-
-
 @pytest.mark.skipif(os.name != "posix", reason="POSIX permissions and symbolic links")
 def test_permissions_are_the_users_and_kept_and_links_are_followed(tmp_path):
     (tmp_path / "data").mkdir()
@@ -182,15 +128,11 @@ def test_permissions_are_the_users_and_kept_and_links_are_followed(tmp_path):
     ("name", "options", "message"),
     cases(
         ("a.vdi", {"compression": "gzip"}, r"must be one of lz4, zstd, deflate and none; got 'gz"),
-        ("a.vdi", {"level": 0}, "level must be a whole number from 1 to 9; got 0"),
         ("a.vdi", {"level": "best"}, "level must be a whole number from 1 to 9; got 'best'"),
         ("a.vdi", {"precision": "half"}, "precision must be .exact. or .8-byte."),
         ("a.vdi", {"exact": True}, "options compression, level, precision; got exact"),
-        ("a.exr", {"precision": "8-byte"}, "got precision"),
         ("a.exr", {"compression": "zips"}, "with the options none; got compression"),
         ("a.html", {"compression": "zstd"}, "must be deflate; got 'zstd'"),
-        ("a.html", {"exact": True}, "got exact"),
-        ("a.html", {"background": (2, 0)}, "background"),
     ),
 )
 def test_options_are_checked_before_anything_is_written(name, options, message, tmp_path):
@@ -206,6 +148,20 @@ def archive_with(text):
     return stream.getvalue()
 
 
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"version": 5, "written_by": "pyvista-vdi 9.0"}, r"5, .* 9\.0'; .* versions 2 to 4: upgr"),
+        ({"version": 1}, "version 1, which is not read any more .*anew"),
+        ({"version": 2, "codec": "deflate"}, "version 2 has no codec 'deflate'"),
+    ],
+)
+def test_other_versions_are_refused(changes, message, file):
+    file.write_bytes(described(file.read_bytes(), precision="exact", **changes))
+    with pytest.raises(VDIFileError, match=message):
+        io.read(file)
+
+
 FOREIGN = r"(?s)a\.vdi is (not a VDI file|truncated).*generate"
 
 
@@ -213,9 +169,7 @@ FOREIGN = r"(?s)a\.vdi is (not a VDI file|truncated).*generate"
     ("content", "message"),
     [
         (b"\x89PNG\r\n\x1a\n" + bytes(100), FOREIGN),
-        (b"NRRD0004\n", FOREIGN),
         (b"P", FOREIGN),
-        (b"PK\x03\x04" + bytes(26) + b"other.js", FOREIGN),
         (archive_with('{"format": "other"}'), "not a VDI file: vdi.json does not name the format"),
         (b"", r"is damaged: it is empty; copy it .* again"),
     ],
@@ -225,28 +179,6 @@ def test_a_foreign_file(content, message, tmp_path):
     path.write_bytes(content)
     with pytest.raises(VDIFileError, match=message):
         io.read(path)
-
-
-NEWER = (
-    r"is of format version 5, written by 'pyvista-vdi 9\.0'; this is pyvista-vdi .*, which reads "
-    r"up to version 4: upgrade by pip install -U pyvista-vdi"
-)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"version": 5, "written_by": "pyvista-vdi 9.0"}, NEWER),
-        ({"version": 1}, "version 1, which is not read any more .*anew"),
-        ({"version": 4, "codec": "lz4"}, "version 4 has no codec 'lz4'"),
-        ({"version": 3, "codec": "deflate"}, "version 3 has no codec 'deflate'"),
-        ({"version": 2, "codec": "deflate"}, "version 2 has no codec 'deflate'"),
-    ],
-)
-def test_versions_that_are_newer_or_have_no_such_codec(changes, message, file):
-    file.write_bytes(described(file.read_bytes(), precision="exact", **changes))
-    with pytest.raises(VDIFileError, match=message):
-        io.read(file)
 
 
 @pytest.mark.parametrize("codec", ["lz4", "deflate"])
@@ -274,13 +206,6 @@ def test_every_changed_byte_is_noticed_or_harmless(precision, file):
     check_changed_bytes(file, io.read, VDIFileError, places)
 
 
-@pytest.mark.parametrize("name", [*ARRAYS, "chunks", "vdi.json"])
-def test_a_missing_member(name, file):
-    rewrite(file, lambda members: members.pop(name))
-    with pytest.raises(VDIFileError, match=rf"its member '{name}' is missing|not a VDI file"):
-        io.read(file)
-
-
 def without(name):
     """Return an edit that leaves an entry of the description out."""
 
@@ -295,17 +220,12 @@ def without(name):
 @pytest.mark.parametrize(
     ("edit", "why"),
     [
-        (put("back", 0, 0), "no thickness, or a code beyond"),
         (put("back", 0, 65535), "no thickness, or a code beyond"),
-        (put("front", 1, 65535), "no thickness, or a code beyond"),
         (put("optical_depth", 0, 4096), "no thickness, or a code beyond"),
         (put("stride", slice(None), 0), "lists with a stride are not those"),
-        (put("stride", slice(None), 65535), "beyond the VDI's grid"),
-        (put("origin", 0, 2**31 - 1, "<i4"), "beyond the VDI's grid"),
         (put("origin", 0, -(2**31), "<i4"), "beyond the VDI's grid"),
         (put("counts", 0, 255, "u1"), "lists do not hold"),
         (without("depth_step"), "incomplete or wrong: KeyError.'depth_step'"),
-        (without("precision"), "incomplete or wrong: KeyError.'precision'"),
     ],
 )
 def test_codes_that_packing_does_not_give(edit, why, packed):
@@ -315,18 +235,8 @@ def test_codes_that_packing_does_not_give(edit, why, packed):
 
 
 @pytest.mark.parametrize(
-    "text",
-    [b"[" * 100000, b"\xff\xfe", b"{", b'{"format": NaN}', b"9" * 5000],
-    ids=["nested", "bytes", "cut off", "nan", "digits"],  # pytest 8 writes values out
+    ("codec", "declared"), [("lz4", {"n": 10**12}), ("deflate", {"window": [65536, 65536]})]
 )
-def test_a_description_that_is_no_json(text, file):
-    rewrite(file, lambda members: members.update({"vdi.json": text}))
-    with pytest.raises(VDIFileError, match=r"is no JSON|is not a VDI file"):
-        io.read(file)
-
-
-@pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize("declared", [{"n": 10**12}, {"window": [65536, 65536]}])
 def test_nothing_is_allocated_for_what_a_file_only_declares(declared, codec, file):
     file.write_bytes(declaring(small_vdi().save(file, compression=codec).read_bytes(), **declared))
     tracemalloc.start()
@@ -340,20 +250,6 @@ def test_nothing_is_allocated_for_what_a_file_only_declares(declared, codec, fil
         tracemalloc.stop()
     # The file, its description and Python's own; the arrays declared would take tens of gigabytes
     assert peak < 4 * file.stat().st_size + 2**20
-
-
-@pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize("name", ARRAYS)
-def test_a_chunk_that_was_changed(name, codec, tmp_path):
-    """The index has the checksum of every chunk, whatever ZIP's own says."""
-    path = io.write(large_vdi((8, 8)), tmp_path / "a.vdi", compression=codec)
-
-    def edit(members):
-        members[name] = members[name][:-1] + bytes([members[name][-1] ^ 1])
-
-    rewrite(path, edit, arrays=())
-    with pytest.raises(VDIFileError, match=f"array '{name}': chunk 0 .* checksum differs"):
-        io.read(path)
 
 
 @pytest.mark.parametrize(
@@ -409,29 +305,6 @@ def test_version_4_begins_with_a_coarse_level(tmp_path):
         assert "coarse.vdi" not in archive.namelist()
 
 
-@pytest.mark.parametrize(
-    ("compression", "edit", "message"),
-    [
-        ("none", put("counts", slice(None), 3, "u1"), "its lists do not hold 32 supersegments"),
-        (
-            "none",
-            put("optical_depth", slice(None), -1, "<f4"),
-            "it holds no valid VDI: supersegment 0 .*optical_depth",
-        ),
-        (
-            "lz4",
-            put("color", slice(4, 8), [255, 255, 255, 127], "u1"),
-            "array 'color': a chunk declares 2147483647 bytes",
-        ),
-    ],
-)
-def test_arrays_that_break_a_rule(compression, edit, message, tmp_path):
-    path = io.write(large_vdi((4, 4)), tmp_path / "a.vdi", compression=compression)
-    rewrite(path, edit)
-    with pytest.raises(VDIFileError, match=message):
-        io.read(path)
-
-
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_members_that_are_compressed_elsewhere_or_there_twice_are_refused(file):
     whole = file.read_bytes()
@@ -448,14 +321,3 @@ def test_members_that_are_compressed_elsewhere_or_there_twice_are_refused(file):
     file.write_bytes(rewritten(whole, lambda _: None, compress_type=zipfile.ZIP_DEFLATED))
     with pytest.raises(VDIFileError, match="its member 'vdi.json' is not stored plainly"):
         io.read(file)
-
-
-def test_the_format_is_documented_as_it_is(file):
-    """docs/files.md names every member and every entry of the description."""
-    page = Path(__file__).parents[2] / "docs" / "files.md"
-    if not page.is_file():
-        pytest.skip("the documentation is not beside the tests")
-    text = page.read_text(encoding="utf-8")
-    with zipfile.ZipFile(file) as archive:
-        names = [*archive.namelist(), *json.loads(archive.read("vdi.json"))]
-    assert [n for n in names if not re.search(rf"`{re.escape(n)}`", text)] == []

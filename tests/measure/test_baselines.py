@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 import strategies
 from oracle import explain, total
-
-from pyvista_vdi.model.compositing import Segment
+from reference.compositing import Segment
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 if not BENCHMARKS.is_dir():

@@ -69,7 +69,7 @@ def test_the_command_writes_figures_and_a_table(shell, tmp_path, capsys, default
     assert cli.main([*run, "--sweep", "sides=2"]) == 1
     assert "--sweep knows no 'sides'" in capsys.readouterr().err
     assert cli.main([*run, "--sweep", "lists=many"]) == 1
-    assert "--sweep lists takes a number; got 'many'" in capsys.readouterr().err
+    assert "--sweep lists takes numbers; got 'many'" in capsys.readouterr().err
 
 
 def test_a_setting_dominates_that_is_better_and_nowhere_worse():

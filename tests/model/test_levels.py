@@ -15,41 +15,14 @@ LEVELS = [Grid((n + 1,) * 3, (2 / n,) * 3, (-1.0,) * 3, np.eye(3)) for n in (64,
 FROM_TEN = Camera(position=(0, 0, 10), focal_point=(0, 0, 0), view_up=(0, 1, 0), view_angle=90)
 
 
-def test_width_at_the_nearest_face():
-    # The face is 9 in front of the eye, where 90 lists share 18
-    assert nearest_depth(LEVELS[0], FROM_TEN, (90, 90)) == pytest.approx(9, rel=1e-12)
-    for size in ((90, 90), (180, 90)):
-        assert "half a list's width, 0.1 where" in required_level(LEVELS, FROM_TEN, size)[1]
-
-
 # Half a list's width at 9 is 9 / lists; voxels are .03125, .0625, .125, .25
 @pytest.mark.parametrize(
     ("lists", "level"),
     [(1000, 0), (145, 0), (143, 1), (73, 1), (71, 2), (37, 2), (35, 3), (9, 3)],
 )
 def test_level_is_the_coarsest_that_is_no_coarser_than_half_a_list(lists, level):
-    found, why = required_level(LEVELS, FROM_TEN, (lists, lists), "mm")
-    assert found == level
-    assert "half a list's width" in why
-    assert f"{9 / lists:.3g} mm" in why
-
-
-def test_parallel_lists_are_equally_wide_everywhere():
-    view = FROM_TEN.replace(parallel_projection=True, parallel_scale=3.0)
-    assert "half a list's width, 0.3 where" in required_level(LEVELS, view, (20, 10))[1]
-    assert required_level(LEVELS, view, (94, 47))[0] == 1  # half a list is a little over .0625
-    assert required_level(LEVELS, view, (98, 49))[0] == 0
-
-
-def test_a_transform_of_the_model_counts():
-    matrix = np.diag([4.0, 4, 4, 1])
-    far = Camera(
-        position=(0, 0, 40), focal_point=(0, 0, 0), view_up=(0, 1, 0), view_angle=90,
-        model_transform=matrix,
-    )  # fmt: skip
-    for lists in (145, 143, 71):
-        near = required_level(LEVELS, FROM_TEN, (lists, lists))[0]
-        assert required_level(LEVELS, far, (lists, lists))[0] == near
+    for size in ((lists, lists), (2 * lists, lists)):
+        assert required_level(LEVELS, FROM_TEN, size) == level
 
 
 def test_only_what_is_in_the_window_is_near():
@@ -67,25 +40,6 @@ def test_only_what_is_in_the_window_is_near():
 
 def test_in_the_volume_the_finest_and_past_it_the_coarsest():
     inside = FROM_TEN.replace(position=(0, 0, 0.5), focal_point=(0, 0, -1))
-    assert required_level(LEVELS, inside, (9, 9)) == (0, "the finest, as V_O is in the volume")
+    assert required_level(LEVELS, inside, (9, 9)) == 0
     away = FROM_TEN.replace(focal_point=(0, 0, 20))
-    level, why = required_level(LEVELS, away, (9000, 9000))
-    assert level == 3
-    assert "sees nothing" in why
-
-
-def test_axes_that_no_level_makes_coarser_do_not_count():
-    # As microscopes have it: planes lie five times as far apart, and all levels keep them
-    def levels(between_planes):
-        return [
-            Grid((n + 1, n + 1, 13), (2 / n, 2 / n, between_planes), (-1,) * 3, np.eye(3))
-            for n in (64, 32, 16)
-        ]
-
-    for between_planes in (10 / 64, 2 / 64):
-        few = levels(between_planes)
-        half = nearest_depth(few[0], FROM_TEN, (100, 100)) / 100  # a list is 2 Z / 100 wide
-        assert 2 / 32 < half < 2 / 16
-        assert required_level(few, FROM_TEN, (100, 100))[0] == 1
-        assert required_level(few, FROM_TEN, (200, 200))[0] == 0
-        assert required_level(few, FROM_TEN, (50, 50))[0] == 2
+    assert required_level(LEVELS, away, (9000, 9000)) == 3

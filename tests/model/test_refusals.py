@@ -10,28 +10,20 @@ import math
 import numpy as np
 import pytest
 
-from pyvista_vdi import VDI, AmbientOcclusion, Cropping, Light, TransferFunction, Volume
+from pyvista_vdi import VDI, AmbientOcclusion, Cropping, TransferFunction, Volume
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidCameraError,
     InvalidVDIError,
     InvalidVolumeError,
 )
-from pyvista_vdi.model import compositing
 from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
-from pyvista_vdi.model.checks import as_number, as_whole
-from pyvista_vdi.model.compositing import Segment
-from pyvista_vdi.model.coverage import bounds_corners, covering_view
-from pyvista_vdi.model.cropping import checked_opacity_multiplier
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.options import GenerationOptions, MediumOptions
 from pyvista_vdi.model.packing import DEPTH_CODES
 from pyvista_vdi.model.render_options import (
     MAX_PREVIEW_SAMPLES,
-    FrameRequest,
     RenderOptions,
 )
-from pyvista_vdi.model.standard_cases import filling_camera
 
 pytestmark = pytest.mark.fast
 
@@ -43,7 +35,6 @@ NORMALS = ([[1, 0, 0], [0, 1, 0], [1, 1, 0]], [1, 0, 0], [[NAN] * 3] * 3, "x")
 FLAT = np.diag([1.0, 1.0, 0.0, 1.0])
 PROJECTIVE = np.eye(4) + np.diag([0, 0, 1], -1)
 PICTURE, CUBE = np.zeros((24, 32, 3)), np.zeros((2, 2, 2))
-NEAR = Segment(1.0, 2.0, np.zeros(3), 1.0)
 
 #: Arguments that each of these takes.
 GOOD = {
@@ -66,10 +57,8 @@ GOOD = {
     },
     Volume: {"array": CUBE},
     RenderOptions: {},
-    filling_camera: {"bounds": PLANES, "window_size": (64, 64)},
 }
 CAMERA, VALID = Camera(**GOOD[Camera]), VDI(**GOOD[VDI])
-FRAME = FrameRequest(CAMERA, (4, 3))
 #: Those of which a changed copy is refused in the same words.
 COPIES = {
     Camera: CAMERA,
@@ -80,7 +69,6 @@ ERRORS = {
     Camera: InvalidCameraError,
     Camera.from_any: InvalidCameraError,
     Camera.from_dict: InvalidCameraError,
-    CAMERA.replace: InvalidCameraError,
     CAMERA.azimuth: InvalidCameraError,
     VDI: InvalidVDIError,
     Volume: InvalidVolumeError,
@@ -98,15 +86,8 @@ def long_list(count):
     return VDI(CAMERA, (1, 1), [0, count], faces[:-1], faces[1:], *media, PLANES)
 
 
-def lists_of_a_window(size):
-    return VDI(**{**GOOD[VDI], "window_size": size})
-
-
-def covering_lists(most):
-    return covering_view(CAMERA, (9, 9), bounds_corners(PLANES), max_lists_per_pixel=most)
-
-
-#: By what is called: its arguments, of keywords where they are a dictionary, and the words.
+#: By what is called: its arguments, of keywords where they are a dictionary, and the words; a row
+#: for each check.
 REFUSED = {
     AmbientOcclusion: [
         ({"radius": 0}, "a positive length in model units; got 0"),
@@ -126,125 +107,62 @@ REFUSED = {
     ],
     Cropping: [
         (((HUGE,) * 6,), "cropping takes six planes"),
-        ((PLANES, INF), "27 flags, .* got inf"),
         ((PLANES, TWO), "27 flags, .* got array"),
         ((PLANES, "hedge"), "27 flags, 0 to 0x7ffffff, or one of 'subvolume'.*got 'hedge'"),
-        *(((PLANES, regions), "27 flags") for regions in (2**27, -1, 1.5, True, None)),
         *(((PLANES, 0, normals), "three independent directions.*got") for normals in NORMALS),
-    ],
-    Cropping.from_any: [
-        *each("six planes.*got", (1, 2, 3), 5, "fence", (0, 1, 0, 1, 0, NAN)),
-        *each("27 flags", (PLANES, "hedge"), (PLANES, -1)),
-    ],
-    checked_opacity_multiplier: [
-        *each("opacity_multiplier is a finite factor", -1, NAN, INF, "thick", None, HUGE)
     ],
     RenderOptions: [
         ({"clipping_planes": [[HUGE] * 6]}, "clipping_planes must be"),
         ({"clipping_planes": [[0, 0, 0, 0, 0, 0]]}, "plane"),
         ({"cropping": (1, 2, 3)}, "cropping"),
         ({"opacity_multiplier": -1}, "opacity_multiplier"),
-        ({"opacity_multiplier": HUGE}, "opacity_multiplier is a finite factor"),
-        ({"preview_samples": TWO}, "preview_samples must be a whole number"),
         ({"preview_samples": "8"}, "preview_samples must be .* got '8'"),
-        *(
-            ({"preview_samples": wrong}, "preview_samples must be")
-            for wrong in (0, -1, 1.5, "many", NAN, MAX_PREVIEW_SAMPLES + 1)
-        ),
-        *(
-            ({"transmittance_cutoff": wrong}, "transmittance_cutoff must be a number from 0")
-            for wrong in (-0.1, 1, 2.0, NAN, "much")
-        ),
+        ({"preview_samples": MAX_PREVIEW_SAMPLES + 1}, "preview_samples must be"),
+        ({"transmittance_cutoff": 1}, "transmittance_cutoff must be a number from 0"),
     ],
-    FRAME.replace: [
-        ({"size": (0, 3)}, "window_size"),
-        ({"out": np.empty((4, 3, 4), np.float32)}, "out must be float32"),
-    ],
-    GenerationOptions: [
-        ({"max_supersegments": TWO}, "max_supersegments must be a whole"),
-        ({"max_supersegments": "8"}, "max_supersegments must be .* got '8'"),
-        ({"max_supersegments": 0}, "max_supersegments.*got 0"),
-        ({"max_supersegments": 4097}, "max_supersegments.*4096.*got 4097"),
-        ({"max_supersegments": 2.5}, "max_supersegments.*got 2.5"),
-        ({"tolerance": -1.0}, "tolerance.*got -1"),
-        ({"view_cone": 91.0}, "view_cone.*got 91"),
-        ({"criterion": "depth"}, "criterion must be .least-error. or .homogeneity.; got .depth."),
-    ],
-    MediumOptions: [({"memory_limit": HUGE}, "memory_limit must be a number of bytes")],
-    Light: [({"position": (HUGE, 0, 0)}, "a light's position must be 3 finite numbers")],
     TransferFunction: [
         ({"opacities": [0.5]}, "as many opacities as colors; got 1 and 2"),
-        ({"opacities": []}, r"opacities must have shape \(n,\); got \(0,\)"),
         ({"opacities": [[0, 1]]}, r"opacities must have shape \(n,\); got \(1, 2\)"),
         ({"opacities": [0, 1.5]}, "opacities must lie between 0 and 1; got 0.0 to 1.5"),
-        ({"opacities": [-0.5, 1]}, "opacities must lie between 0 and 1; got -0.5"),
         ({"opacities": [NAN, 1]}, "opacities must lie between 0 and 1; .* and NaN"),
-        ({"opacities": [0, 1e300]}, "opacities must lie between 0 and 1; got 0.0 to inf"),
         ({"opacities": ["thick", "thin"]}, "opacities must be numbers"),
         ({"colors": [[0, 0, 0, 1]] * 2}, r"colors must have shape \(n, 3\); got \(2, 4\)"),
         ({"colors": [[0, 0, 255]] * 2}, "colors must lie between 0 and 1; got 0.0 to 255.0"),
         ({"scalar_range": (3, 1)}, r"\(clim\) must be two finite numbers, the smaller first"),
-        *(
-            ({"scalar_range": wrong}, "must be two finite numbers")
-            for wrong in ((0, INF), (NAN, 1), 3, (1, 2, 3), ("a", "b"))
-        ),
+        ({"scalar_range": (0, INF)}, "must be two finite numbers"),
+        ({"scalar_range": ("a", "b")}, "must be two finite numbers"),
         ({"unit_distance": 0}, "unit_distance must be a positive length in model units; got 0"),
-        ({"unit_distance": INF}, "unit_distance must be a positive length"),
-        ({"unit_distance": -1}, "unit_distance .* got -1"),
         ({"unit_distance": "x"}, "unit_distance .* got 'x'"),
         ({"interpolation": "cubic"}, "interpolation must be 'nearest' or 'linear'; got 'cubic'"),
     ],
-    COPIES[TransferFunction].replace: [({"gamma": 2.2}, "has no gamma")],
-    TransferFunction.from_dict: [
-        *each("no description of a transfer function", None, [1], {}, {"colors": [[0, 0, 0]]}),
-        *each("no description of a transfer function", {"shading": 3}, {"shading": {"glow": 1}}),
-    ],
+    TransferFunction.from_dict: each(
+        "no description of a transfer function", None, [1], {}, {"shading": {"glow": 1}}
+    ),
     Camera: [
         ({"focal_point": (0, 0, 5)}, r"and focal point are the same point \(0.0, 0.0, 5.0\)"),
         ({"view_up": (0, 0, 0)}, "view_up is the zero vector"),
         ({"view_up": (0, 0, 7)}, r"is parallel to the direction of projection \(0.0, 0.0, -1.0\)"),
         ({"position": (0, 0, NAN)}, "position must be 3 finite numbers"),
         ({"position": "here"}, "position must be 3 finite numbers; got 'here'"),
-        ({"position": (HUGE, 0, 0)}, "position must be 3 finite numbers"),
         ({"position": (1e308, 0, 0), "focal_point": (-1e308, 0, 0)}, "too far apart"),
-        ({"focal_point": (0, 0)}, "focal_point must be 3 finite numbers"),
-        ({"view_angle": 0}, "view_angle .* got 0"),
         ({"view_angle": 180}, "view_angle .* got 180"),
-        ({"view_angle": NAN}, "view_angle .* got nan"),
         ({"view_angle": NAN, "parallel_projection": True}, "view_angle must lie between"),
-        ({"view_angle": "wide"}, "view_angle must lie between"),
-        ({"parallel_scale": 0}, "parallel_scale .* got 0"),
-        ({"parallel_scale": INF}, "parallel_scale .* got inf"),
         ({"parallel_scale": [1]}, "parallel_scale .* got nan"),
         ({"window_center": (0, 0, 0)}, "window_center must be 2 finite numbers"),
         ({"model_transform": np.eye(3)}, "model_transform must be 4 x 4"),
         ({"model_transform": FLAT}, "model_transform cannot be inverted"),
         ({"model_transform": PROJECTIVE}, "model_transform must be affine"),
-        ({"model_transform": np.full((4, 4), NAN)}, "model_transform must be 4 x 4 finite"),
-        ({"model_transform": [[1, 2], [3]]}, "model_transform must be 4 x 4 finite"),
     ],
     Camera.from_any: [(({},), "got dict")],
-    CAMERA.replace: [({"zoom": 2}, "has no zoom")],
-    Camera.from_dict: [
-        (([1],), "description is a dictionary; got list"),
-        (
-            ({"position": (0, 0, 1), "focal_point": (0, 0, 0), "zoom": 2},),
-            r"unknown entries \['zoom'\], lacks \['view_up'\]",
-        ),
-    ],
+    Camera.from_dict: [(([1],), "description is a dictionary; got list")],
     CAMERA.azimuth: each("turned by a finite angle; got", INF, "far"),
     CAMERA.tile: [
-        (((0, 9), (0, 0), (5, 5)), "window_size must be between 1 and"),
         (((9, 9), (0, 0), (5, 0)), "tile_size must be between 1 and"),
         (((9, 9), (0.5, 0), (5, 5)), r"corner must be \(column, row\), two whole numbers of pix"),
-        (((9, 9), (1, 2, 3), (5, 5)), r"corner must be .*; got \(1, 2, 3\)"),
     ],
     check_window_size: [
-        (((0, 5),), "between 1 and 65536 pixels along each edge; got 0 x 5"),
         (((5, MAX_WINDOW_EDGE + 1),), "got 5 x 65537"),
-        (((-1, 5),), "got -1 x 5"),
         (((2.5, 5),), r"two whole numbers of pixels; got \(2.5, 5\)"),
-        *each("two whole numbers", (NAN, 5), (INF, 5), (5,), "ab"),
         ((5,), "two whole numbers of pixels; got 5"),
     ],
     VDI: [
@@ -252,39 +170,25 @@ REFUSED = {
         ({"offsets": [1, 2, 2, 3]}, r"offsets\[0\] must be 0; got 1"),
         ({"offsets": [0, 2, 1, 3]}, r"must not decrease; offsets\[1\] = 2 is followed by 1"),
         ({"offsets": [0, 1, 2, 2]}, r"offsets\[-1\] = 2 supersegments, but front has 3"),
-        ({"offsets": [0, -1, 2, 3]}, "offsets must be whole numbers >= 0, .*; got -1 among"),
         ({"offsets": [0, 1.5, 2, 3]}, "offsets must be whole numbers >= 0, .* of float64"),
         ({"offsets": None}, "offsets must be numbers, in an array; got None"),
-        ({"offsets": [[0, 2, 2, 3]]}, r"offsets must have shape \(n,\); got \(1, 4\)"),
         ({"back": [2.0, 3.0]}, "front has 3, back has 2, color has 3, .*: give each as"),
         ({"color": [0, 0, 0]}, r"color must have shape \(n, 3\); got \(3,\)"),
-        ({"front": ["a", "b", "c"]}, r"front must be numbers, .*; got \['a', 'b', 'c'\]"),
         ({"front": [[1, 2], [3]]}, "front must be an array of numbers"),
         (
             {"front": [1.0, 3.0, 1.5]},
             r"supersegment 1 \(list 0: pixel x=0, y=0\) breaks the rule 'front < back': front 3.0",
         ),
-        ({"front": [1.0, 4.0, 1.5]}, "supersegment 1 .* 'front < back'"),
         ({"front": [1.0, 1.5, 1.5]}, "1 .* 'sorted within its list and not overlapping'"),
         ({"front": [NAN, 2.0, 1.5]}, "supersegment 0 .* 'front and back finite'"),
         ({"front": [-4.5, 2, 1.5]}, r"0 .* 'in front of the eye \(depth >= 0\)'.*depth_origin 4.0"),
-        ({"back": [2.0, INF, 1.75]}, "supersegment 1 .* 'front and back finite'"),
         ({"back": [2.0, 1e300, 1.75]}, "supersegment 1 .* 'front and back finite'"),
-        (
-            {"color": [[0, 0, 0], [1, 1, 1], [0.2, 1.5, 0.6]]},
-            r"supersegment 2 \(list 2: pixel x=2, y=0\) breaks the rule '0 <= color <= 1'",
-        ),
         ({"color": [[0, NAN, 0], [1, 1, 1], [0, 0, 0]]}, "supersegment 0 .* '0 <= color <= 1'"),
-        ({"optical_depth": [0, -0.5, 1]}, "supersegment 1 .* 'optical_depth >= 0 and finite'"),
         ({"optical_depth": [0, INF, 1]}, "supersegment 1 .* 'optical_depth >= 0 and finite'"),
-        ({"optical_depth": [0, 0, NAN]}, "supersegment 2 .* 'optical_depth >= 0 and finite'"),
         ({"depth_origin": INF}, "depth_origin must be finite; got inf"),
-        ({"depth_origin": "x"}, "depth_origin must be finite; got 'x'"),
-        *(({"depth_origin": x}, "depth_origin must be finite; got") for x in ([], "3", True)),
-        *(
-            ({"bounds": wrong}, "bounds must be six finite numbers")
-            for wrong in ((1, -1, *PLANES[2:]), (0, 1, 0, 1), (*PLANES[1:], NAN), [[1, 2], [3]], {})
-        ),
+        ({"depth_origin": "3"}, "depth_origin must be finite; got"),
+        ({"bounds": (1, -1, *PLANES[2:])}, "bounds must be six finite numbers"),
+        ({"bounds": {}}, "bounds must be six finite numbers"),
         ({"metadata": [1]}, "metadata must be a dictionary; got list"),
     ],
     long_list(DEPTH_CODES + 1).with_precision: [
@@ -295,55 +199,22 @@ REFUSED = {
         ({"array": np.zeros((3, 3))}, r"three-dimensional array; got shape \(3, 3\)$"),
         ({"array": np.zeros((3, 3, 3, 4))}, r"shape \(3, 3, 3, 4\): give one scalar per point"),
         ({"array": np.zeros((0, 3, 3))}, r"the volume is empty: its shape is \(0, 3, 3\)"),
-        *(
-            (
-                {"array": np.zeros(shape)},
-                "only one plane of points.* at least two points along each",
-            )
-            for shape in ((1, 3, 3), (3, 1, 3), (3, 3, 1), (1, 1, 9), (1, 1, 1))
-        ),
+        ({"array": np.zeros((3, 1, 3))}, "only one plane of points.* two points along each"),
         ({"array": CUBE.astype(complex)}, "voxels of type complex128 are not supported"),
         ({"array": np.full((2, 2, 2), "a")}, "are not supported: convert to one of uint8"),
-        ({"array": np.full((2, 2, 2), None)}, "voxels of type object are not supported"),
         ({"array": np.full((2, 2, 2), 2**53 + 1)}, "hold values up to 9007199254740993"),
         ({"array": [[1, 2], [3]]}, "a volume is an array of numbers"),
-        ({"spacing": (1, 0, 1)}, r"spacing must be positive .* got \(1.0, 0.0, 1.0\)"),
         ({"spacing": (1, 1, -1)}, "flip the array"),
-        ({"spacing": (1, 1)}, "spacing must be 3 finite numbers"),
         ({"spacing": "thin"}, "spacing must be 3 finite numbers; got 'thin'"),
         ({"origin": (0, 0, INF)}, "origin must be 3 finite numbers"),
         ({"direction": np.eye(4)}, "direction must be 3 x 3 finite numbers"),
-        ({"direction": np.full((3, 3), NAN)}, "direction must be 3 x 3 finite numbers"),
         ({"direction": np.diag([1, 1, 0])}, "cannot be inverted"),
     ],
     compare_images: [
         ((PICTURE, PICTURE[:, 1:]), "different sizes, 32 x 24 and 31 x 24"),
-        ((PICTURE[..., :2], PICTURE), r"got float64 of shape \(24, 32, 2\)"),
         ((PICTURE.astype(np.uint8), PICTURE), "got uint8 of shape"),
         ((PICTURE[0], PICTURE), r"got float64 of shape \(32, 3\)"),
-        ((PICTURE[:0], PICTURE[:0]), "empty"),
-    ],
-    filling_camera: [
-        ({"bounds": PLANES[:5]}, "six finite numbers"),
-        ({"bounds": (0, -1, *PLANES[2:])}, "six finite numbers x0 <= x1"),
-        ({"bounds": (1,) * 6}, "are a point"),
-        ({"elevation": 90}, "elevation must lie between -90 and 90"),
-        ({"view_angle": 180}, "view_angle must lie between 0 and 180"),
-        ({"view_angle": 5e-324}, "view_angle 5e-324 is too narrow"),
-    ],
-    lists_of_a_window: each("got 0 x 1", (0, 1)),
-    covering_lists: [((0,), "max_lists_per_pixel must be positive; got 0")],
-    compositing.split: [((NEAR, 2.0), "from 1.0 to 2.0 cannot be split at 2.0")],
-    compositing.merge: [
-        ((NEAR, NEAR), "must end before the farther begins"),
-        ((NEAR, Segment(2.0, 3.0, np.zeros(3), 1.0), "mean"), "weighting must be.*got 'mean'"),
-    ],
-    compositing.optical_depth: [(([0.5, 1.5],), "opacity must lie between 0 and 1")],
-    compositing.opacity: [((-1.0,), "optical_depth must not be negative or NaN")],
-    compositing.transmittance: [((NAN,), "optical_depth must not be negative or NaN")],
-    compositing.optical_depth_over_length: [
-        ((1.0, 1.0, 0.0), "whole_length must be positive"),
-        ((1.0, -1.0, 1.0), "length must not be negative"),
+        ((PICTURE * NAN, PICTURE), r"not finite: pixel \(column 0, row 0\)"),
     ],
 }
 
@@ -366,12 +237,3 @@ def test_what_is_refused(call, arguments, message):
     if call in COPIES:
         with pytest.raises(error, match=message):
             COPIES[call].replace(**arguments)
-
-
-def test_numbers_are_told_from_texts_and_truth_values():
-    assert as_number(np.float32(0.5)) == 0.5
-    assert as_whole(np.int64(3)) == as_whole(3.0) == 3
-    for none in ("3", True, np.True_, None, HUGE, TWO, NAN):
-        assert math.isnan(as_number(none))
-    assert math.isnan(as_whole(2.5))
-    assert math.isnan(as_whole(INF))

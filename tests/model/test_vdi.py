@@ -30,40 +30,6 @@ def arguments(**changes):
     return {**good, **changes}
 
 
-def test_arrays_have_the_contract_s_types_and_are_read_only():
-    front = np.array([1.0, 2.0, 1.5], dtype=np.float32)
-    vdi = VDI(**arguments(front=front, metadata={"step": 1}))
-    assert vdi.offsets.dtype == np.uint64
-    for name in ("front", "back", "color", "optical_depth"):
-        array = getattr(vdi, name)
-        assert array.dtype == np.float32
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 0
-    front[0] = 7  # a caller's own array stays writable
-    assert vdi.color.shape == (3, 3)
-    assert vdi.bounds == (-1.0, 1.0, -2.0, 2.0, -3.0, 3.0)
-    assert vdi.metadata == {"step": 1}
-    assert (vdi.window_size, vdi.depth_origin, vdi.n_supersegments) == ((3, 1), 4.0, 3)
-    assert vdi.nbytes == 4 * 8 + 3 * 4 * (1 + 1 + 3 + 1)
-    assert "3 x 1 lists, 2 not empty, 3 supersegments" in repr(vdi)
-
-
-def test_lists_are_found_by_pixel_from_the_bottom():
-    rng = np.random.default_rng(1)
-    vdi = strategies.random_vdi(rng)
-    width, height = vdi.window_size
-    for y in range(height):
-        for x in range(width):
-            part = vdi.list_at(x, y)
-            i = y * width + x
-            assert (part.start, part.stop) == (vdi.offsets[i], vdi.offsets[i + 1])
-            assert vdi.counts[y, x] == part.stop - part.start
-    with pytest.raises(IndexError, match="pixel \\(-1, 0\\) is outside the window of"):
-        vdi.list_at(-1, 0)
-    with pytest.raises(IndexError, match=f"pixel \\(0, {height}\\)"):
-        vdi.list_at(0, height)
-
-
 @given(GENERATORS)
 def test_random_vdis_are_equal_to_themselves_only(rng):
     vdi = strategies.random_vdi(rng, max_window=(4, 4))

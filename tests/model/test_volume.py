@@ -8,18 +8,7 @@ import strategies
 from hypothesis import given
 from strategies import GENERATORS
 
-from pyvista_vdi import InvalidVolumeError
-from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
-
-
-@pytest.mark.parametrize("dtype", VOXEL_TYPES)
-def test_supported_types_are_taken_as_they_are(dtype):
-    array = np.zeros((2, 3, 4), dtype=dtype)
-    volume = Volume(array)
-    assert np.shares_memory(volume.array, array)
-    assert volume.array.dtype == dtype
-    assert volume.dimensions == (4, 3, 2)
-    assert repr(volume) == f"Volume(4 x 3 x 2 {dtype}, spacing=(1.0, 1.0, 1.0))"
+from pyvista_vdi.model.volume import Volume
 
 
 @pytest.mark.parametrize(
@@ -52,27 +41,3 @@ def test_the_grid_s_points_are_where_vtk_puts_them(rng):
     np.testing.assert_allclose(points.min(axis=0), low, atol=1e-12)
     np.testing.assert_allclose(points.max(axis=0), high, atol=1e-12)
     assert volume.length == pytest.approx(np.linalg.norm(high - low))
-
-
-def test_length_and_unit_distance_are_pyvista_s():
-    """``Plotter.add_volume`` takes the data set's length over the mean dimension less one."""
-    pv = pytest.importorskip("pyvista")
-    grid = pv.ImageData(dimensions=(4, 6, 9), spacing=(0.5, 1, 2), origin=(1, 2, 3))
-    volume = Volume(np.zeros((9, 6, 4)), (0.5, 1, 2), (1, 2, 3))
-    np.testing.assert_allclose(volume.bounds, grid.bounds)
-    assert volume.length == pytest.approx(grid.length)
-    assert volume.default_unit_distance == pytest.approx(
-        grid.length / (np.mean(grid.dimensions) - 1)
-    )
-
-
-@pytest.mark.parametrize("dtype", ["uint8", "int16", "float32", "float64"])
-def test_finite_range_leaves_nan_out(dtype):
-    array = np.arange(8).reshape(2, 2, 2).astype(dtype)
-    assert Volume(array).finite_range() == (0, 7)
-    if array.dtype.kind == "f":
-        array[0, 0, 0] = np.nan
-        assert Volume(array).finite_range() == (1, 7)
-        array[...] = np.nan
-        with pytest.raises(InvalidVolumeError, match="every value of 'density' is NaN"):
-            Volume(array, name="density").finite_range()

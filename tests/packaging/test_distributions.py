@@ -19,56 +19,27 @@ import pytest
 
 import pyvista_vdi
 
-#: Files of the repository that a source distribution has no use for.
-NOT_IN_SDIST = {".gitattributes"}
-
-#: Bytes of the largest file that is tracked, volumes that are shipped apart, and of the sdist.
-LARGEST_FILE, LARGEST_SDIST = 5_000_000, 14_000_000
-
-
-#: What editors, tools and broken-off runs leave behind; and the folders in which tools keep things.
-TEMPORARY = {".tmp", ".orig", ".rej", ".swp", ".log", ".pyc", ".bak"}
-CACHES = {".cache", "__pycache__", ".hypothesis", ".mypy_cache", ".pytest_cache", ".ruff_cache"}
-
-
-def _find_checkout():
-    named = os.environ.get("PYVISTA_VDI_CHECKOUT")
-    folder = Path(named) if named else Path(__file__).resolve().parents[2]
-    is_checkout = (folder / ".git").exists() and (folder / "pyvista_vdi").is_dir()
-    if named and not is_checkout:
-        pytest.fail(f"PYVISTA_VDI_CHECKOUT names {folder}, which is not a checkout of pyvista-vdi")
-    return folder if is_checkout else None
+CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
 
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory):
     """Return (copy of the checkout's files, their names): what git tracks or would track."""
-    checkout = _find_checkout()
-    if checkout is None:
+    if not (CHECKOUT / ".git").exists():
         pytest.skip("no checkout at hand: set PYVISTA_VDI_CHECKOUT to one")
     listing = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"],
-        cwd=checkout,
+        cwd=CHECKOUT,
         capture_output=True,
         check=True,
     )
     names = {name for name in os.fsdecode(listing.stdout).split("\0") if name}
-    names = {name for name in names if (checkout / name).is_file()}
+    names = {name for name in names if (CHECKOUT / name).is_file()}
     copy = tmp_path_factory.mktemp("source")
     for name in names:
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(checkout / name, copy / name)
+        shutil.copy2(CHECKOUT / name, copy / name)
     return copy, names
-
-
-def test_nothing_large_or_temporary_is_tracked(source):
-    folder, names = source
-    for name in names:
-        path = PurePosixPath(name)
-        temporary = path.suffix in TEMPORARY or path.name.endswith("~") or CACHES & set(path.parts)
-        assert not temporary, name
-        if not name.startswith("pyvista_vdi/data/"):  # write such files where .gitignore names them
-            assert (folder / name).stat().st_size <= LARGEST_FILE, name
 
 
 def _build(source, kind, target):
@@ -114,10 +85,7 @@ def test_wheel_metadata_and_entry_points(wheel):
         for part in ("METADATA", "entry_points.txt")
     )
     assert f"\nVersion: {pyvista_vdi.__version__}\n" in metadata
-    assert "\nRequires-Python: >=3.10\n" in metadata
     assert any(name.endswith(".dist-info/licenses/LICENSE") for name in wheel)
-    for extra in ("cpu", "plot", "test", "docs", "dev"):
-        assert f"\nProvides-Extra: {extra}\n" in metadata
     required = {
         re.match(r"[\w.-]+", line.partition(": ")[2])[0].lower()
         for line in metadata.splitlines()
@@ -129,19 +97,14 @@ def test_wheel_metadata_and_entry_points(wheel):
     assert "pyvista-vdi = pyvista_vdi.cli:main" in entry_points
     _, components = entry_points.split("[pyvista.plotter_components]\n")
     assert "add_vdi = pyvista_vdi.plotting.component\n" in components.split("\n\n")[0] + "\n"
-    assert "[pyvista.accessors]\nvdi = pyvista_vdi.plotting.accessor" in entry_points
-    for group, function in (("readers", "reader:read_vdi"), ("writers", "writer:write_vdi")):
-        names = [f"{suffix} = pyvista_vdi.plotting.{function}" for suffix in (".exr", ".vdi")]
-        assert "\n".join([f"[pyvista.{group}]", *names]) in entry_points
 
 
 def test_sdist_holds_the_repository(source, tmp_path):
     archive = _build(source[0], "sdist", tmp_path)
-    assert archive.stat().st_size <= LARGEST_SDIST
     with tarfile.open(archive) as tar:
         found = {name.partition("/")[2] for name in tar.getnames() if tar.getmember(name).isfile()}
     found = {name for name in found if ".egg-info/" not in name}
-    _assert_same(found - {"PKG-INFO", "setup.cfg"}, source[1] - NOT_IN_SDIST)
+    _assert_same(found - {"PKG-INFO", "setup.cfg"}, source[1] - {".gitattributes"})
 
 
 def test_editable_install_finds_the_kernels(source, tmp_path):
@@ -175,3 +138,13 @@ assert pyvista_vdi.__file__.startswith({str(copy)!r}), pyvista_vdi.__file__
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert result.returncode == 0, result.stderr
+
+
+def test_one_version(source):
+    copy, _ = source
+    for name, pattern in (
+        ("CITATION.cff", r"^version: (\S+)$"),
+        ("tools/conda/recipe.yaml", r'^  version: "(\S+)"$'),
+    ):
+        text = (copy / name).read_text(encoding="utf-8")
+        assert re.findall(pattern, text, re.MULTILINE) == [pyvista_vdi.__version__], name

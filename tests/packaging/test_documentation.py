@@ -5,10 +5,8 @@ Needs a checkout: the folder that ``PYVISTA_VDI_CHECKOUT`` names, or the one the
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import importlib
-import inspect
 import io
 import os
 import re
@@ -17,9 +15,7 @@ from types import ModuleType
 
 import pytest
 
-import pyvista_vdi as pvdi
 from pyvista_vdi import cli
-from pyvista_vdi.io.volumes.formats import FORMATS
 
 CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
 DOCS = CHECKOUT / "docs"
@@ -102,53 +98,6 @@ def test_where_is_what_names_kernels_tests_and_pages_that_exist():
     assert not missing, f"docs/dev/where_is_what.md: {missing}"
 
 
-def test_sources_refer_to_pages_and_headings_that_exist():
-    missing = set()
-    reference = re.compile(r'(docs/[\w/]+\.md)(?:#([\w-]+)|,? \(?"([^"]+)")?')
-    folders = (Path(pvdi.__file__).parent, CHECKOUT / "opencl")
-    sources = (path for folder in folders for path in folder.rglob("*"))
-    for path in (each for each in sources if each.suffix in (".py", ".cl", ".js")):
-        # A reference may go on in the next line of a comment
-        text = re.sub(r"\s*\n\s*(?:#:?|//|\*)? *", " ", path.read_text(encoding="utf-8"))
-        for page, anchor, title in reference.findall(text):
-            wanted = anchor or re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")
-            there = (CHECKOUT / page).is_file()
-            anchors = _anchors(CHECKOUT / page) if there else ()
-            if not any(each.startswith(wanted) for each in anchors):
-                missing.add(f"{path.name}: {page}#{wanted}")
-        missing |= {f"{path.name}: {each}" for each in re.findall(r"DESIGN section \d+", text)}
-    assert not missing, sorted(missing)
-
-
-def test_pages_name_files_that_exist():
-    missing = set()
-    for page in _pages():
-        if page.name == "changelog.md":
-            continue
-        text = page.read_text(encoding="utf-8")
-        roots = r"(?:pyvista_vdi|opencl|tests|benchmarks|examples|docs|tools)"
-        for name in re.findall(rf"(?<![\w/.-])({roots}/[\w/.-]+\.(?:py|cl|md|json|sh))\b", text):
-            if not (CHECKOUT / name).is_file():
-                missing.add(f"{page.name}: {name}")
-    assert not missing, sorted(missing)
-
-
-def test_pages_for_users_say_the_field_s_words():
-    lines = (DOCS / "dev" / "phrases.txt").read_text(encoding="utf-8").splitlines()
-    phrases = "|".join(re.escape(line) for line in lines if not line.startswith("#"))
-    said = []
-    for page in [*DOCS.glob("*.md"), CHECKOUT / "README.md"]:
-        # What is code, a link's place or a term that is explained stays
-        text = re.sub(
-            r"```.*?```|`[^`]*`|\]\([^)]*\)|^\|.*, V_[ON] \|",
-            "",
-            page.read_text("utf-8"),
-            flags=re.S | re.M,
-        )
-        said += [f"{page.name}: {each}" for each in re.findall(rf"\b(?:{phrases})\b", text)]
-    assert not said
-
-
 @pytest.fixture(scope="module")
 def verbs():
     """The verbs of the command line and the options of each, as their help says them."""
@@ -182,73 +131,3 @@ def test_commands_on_pages_are_those_of_the_command_line(verbs):
                 mistakes.append(f"{page.name}: there is no verb {verb}")
     assert not mistakes
     assert seen == set(verbs)
-
-
-def test_the_page_of_the_command_line_has_its_verbs_and_options(verbs):
-    text = (DOCS / "cli.md").read_text(encoding="utf-8")
-    assert re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE) == list(verbs)
-    listed = re.search(r"pyvista-vdi (devices \|.*?)\n```", text, re.DOTALL)[1]
-    assert re.findall(r"\w+", listed) == list(verbs)
-    known = set().union(*verbs.values()) | {"--help"}
-    assert set(re.findall(r"(?<![\w-])--[a-z][\w-]*", text)) <= known
-
-
-#: Tables of arguments, by their page: their heads, and whose they are.
-TABLES = {
-    "guide_plotting.md": ("| argument | default | meaning |", "plotting.component:AddVDI"),
-    "dial.md": ("| argument | asks for |", "api:generate"),
-    "sets.md": ("| argument | |", "extensions.sets.generate:generate_set"),
-}
-
-
-@pytest.mark.parametrize("page", TABLES)
-def test_arguments_on_pages_are_those_of_the_functions(page):
-    pytest.importorskip("pyvista")
-    head, place = TABLES[page]
-    module, _, name = place.partition(":")
-    function = getattr(importlib.import_module(f"pyvista_vdi.{module}"), name)
-    call = function.__call__ if inspect.isclass(function) else function
-    parameters = inspect.signature(call).parameters
-    table = (DOCS / page).read_text(encoding="utf-8").partition(head)[2].partition("\n\n")[0]
-    rows = [line.strip("|").split("|") for line in table.splitlines()[2:]]
-    assert len(rows) > 2
-    for arguments, second, *_ in rows:
-        for argument in re.findall(r"`(\w+)[=`]", arguments):
-            assert argument in parameters, f"{page}: {argument}"
-            if "default" in head:
-                with contextlib.suppress(ValueError, SyntaxError):  # defaults in words
-                    default = ast.literal_eval(second.strip(" `"))
-                    # None stands for a default that other arguments decide
-                    assert parameters[argument].default in (default, None), f"{page}: {argument}"
-
-
-def test_formats_on_the_page_of_files_are_written_and_read(tmp_path):
-    pytest.importorskip("pyvista")
-    text = (DOCS / "files.md").read_text(encoding="utf-8")
-    suffixes = re.findall(
-        r"^\| `(\.\w+)` \| `vdi.save`|^\| `(\.\w+)` \| the same", text, re.MULTILINE
-    )
-    suffixes = [one or other for one, other in suffixes]
-    assert len(suffixes) == 3
-    camera = pvdi.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0))
-    vdi = pvdi.VDI(camera, (2, 2), [0] * 5, [], [], [], [], (-1, 1) * 3)
-    for suffix in suffixes:
-        assert pvdi.read(vdi.save(tmp_path / f"a{suffix}")).window_size == (2, 2)
-    # The formats of volumes: what the table in the package says
-    rows = ["| format | names end in | read by | extra |", "|---|---|---|---|"]
-    for each in FORMATS.values():
-        names = ", ".join(f"`{suffix}`" for suffix in each.suffixes)
-        rows.append(f"| {each.name} | {names} | {each.library} | {each.extra} |")
-    assert "\n".join(rows) in text
-
-
-def test_properties_on_the_page_of_paraview_are_the_plugin_s():
-    folder = CHECKOUT / "pyvista_vdi/extensions/paraview"
-    plugin = "".join(path.read_text(encoding="utf-8") for path in folder.rglob("*.py"))
-    text = (DOCS / "guide_paraview.md").read_text(encoding="utf-8")
-    table = text.partition("| property | meaning |")[2].partition("\n\n")[0]
-    named = [n for row in table.splitlines()[2:] for n in _named(row) if n.isidentifier()]
-    named += re.findall(r"(?:VDIWriter|SaveData|VDISource)\([^)]*?\b([A-Z]\w+)=", text)
-    assert len(named) > 15
-    for name in named:
-        assert re.search(rf"\b{name}\b", plugin), name

@@ -8,7 +8,6 @@ import pyvista as pv
 from plugin_scenes import shown
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.vtk_pipeline.vtk import vtkPropPicker
 
 pytestmark = pytest.mark.gl
@@ -155,11 +154,3 @@ def test_picks_are_where_the_volume_is(plotter, distance):
     position = np.array(actor.pick(*middle).position) - at
     assert np.abs(position).max() < 0.6
     np.testing.assert_allclose(np.array(actor.bounds), np.array(block(at).bounds), rtol=1e-15)
-
-
-def test_where_float64_does_not_tell_voxels_apart_is_said(plotter):
-    at = np.array([1.0, 0, 0]) * 2**46  # its numbers are a 64th apart there
-    with pytest.warns(VDIWarning, match="7.04e[+]13 model units from.*to 0.016.*are 0.062 apart"):
-        plotter.add_vdi(block(at), **LOOKS)
-    with pytest.warns(VDIWarning, match="float64 places points"):
-        pvdi.Volume(np.zeros((3, 3, 3)), origin=(0, 1e15, 0))

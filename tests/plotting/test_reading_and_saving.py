@@ -57,7 +57,7 @@ def test_options_of_saving_and_reading(vdi, tmp_path):
 def test_what_is_no_vdi_is_not_saved_as_one(name, tmp_path):
     with pytest.raises(InvalidVDIError, match=r"holds no VDI .*dataset\.vdi\.generate"):
         pv.ImageData(dimensions=(3, 3, 3)).save(tmp_path / name)
-    with pytest.raises(InvalidVDIError, match="a PolyData that holds no VDI"):
+    with pytest.raises(InvalidVDIError, match="PolyData that holds no VDI"):
         pv.Sphere().save(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 

@@ -46,6 +46,7 @@ ARGUMENTS = {
     "interpolation": ({"interpolation": "cubic"}, "'nearest' or 'linear'"),
     "occlusion": ({"ambient_occlusion": "strong"}, "must be True, a radius.*got 'strong'"),
     "occlusion's radius": ({"ambient_occlusion": 0.0}, "radius of ambient occlusion.*got 0"),
+    "culling": ({"culling": "sideways"}, "culling must be False or one of.*got 'sideways'"),
     "mapper": ({"mapper": "cpu"}, "mapper='cpu' is none of"),
     "no supersegments": ({"max_supersegments": 0}, "from 1 to 4096; got 0"),
     "too many": ({"max_supersegments": 4097}, "1 to 4096; got 4097"),

@@ -1,4 +1,4 @@
-"""What frames take beside a view: memory for the picture, a cutoff; and VDIs drawn in bands."""
+"""What frames take beside a view: memory for the picture, a cutoff."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ import pytest
 import strategies
 from drawing import render_vdi
 from oracle import TOLERANCE
-from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.device import aligned_empty
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest
-from pyvista_vdi.raycasting import raycast
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 
 SIZE = (31, 17)
 
@@ -38,20 +35,6 @@ def test_the_picture_in_the_callers_memory_is_the_same(runtime, aligned):
     assert expected.max() > 0.1
 
 
-@pytest.mark.parametrize(
-    ("out", "message"),
-    [
-        (np.empty((17, 31, 3), np.float32), "out must be float32 of the image's shape"),
-        (np.empty((17, 31, 4)), "out must be float32 of the image's shape"),
-        (np.empty((4, 31, 17), np.float32).T, "'image' must be C-contiguous"),
-    ],
-)
-def test_an_image_that_does_not_fit_is_refused(runtime, out, message):
-    vdi, view = seen_from_beside(1)
-    with pytest.raises(InvalidArgumentError, match=message):
-        render_vdi(vdi, view, SIZE, device=runtime, out=out)
-
-
 def test_no_channel_loses_more_than_the_cutoff(runtime):
     changed = 0
     for seed in range(6):
@@ -70,48 +53,3 @@ def test_no_channel_loses_more_than_the_cutoff(runtime):
         )
         changed += int((rough != default).any())
     assert changed >= 3
-
-
-@pytest.fixture(scope="module", params=["all of it", "parallel", "from inside"])
-def vdi(request):
-    volume = volume_of("uint8")
-    camera = VIEWS[request.param](volume)
-    return pvdi.generate(volume, camera, WINDOW, transfer_function=transfer_for(volume))
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize("n", [2, 5])
-def test_bands_are_the_picture(vdi, n):
-    own = vdi.camera
-    views = [own.azimuth(angle) for angle in (0, 90, 180)]
-    views += [own.elevation(angle) for angle in (-60, -20, 20, 60)]
-    views += [own.replace(parallel_projection=True, parallel_scale=45).elevation(30)]
-    views += [pvdi.Camera((24, 20, 23), (24, 60, 23), (0, 0, 1))]  # from inside
-    for camera in views:
-        request = FrameRequest(camera, (70, 60))
-        expected = raycast.render_vdi(vdi, request)
-        found = raycast.render_in_bands(vdi, request, n)
-        # A ray on the face between two bands rounds to either: nothing else differs by more than
-        # a compositing's rounding
-        differ = np.abs(found - expected).max(axis=2) > 1e-5
-        assert differ.mean() < 0.002, camera
-        assert np.abs(found - expected).mean() < 1e-6, camera
-
-
-def test_what_does_not_fit_is_drawn_in_bands(vdi, monkeypatch):
-    expected = pvdi.render(vdi, vdi.camera, (70, 60))
-    drawn, most, render_vdi = [], vdi.n_supersegments / 3, raycast.render_vdi
-
-    def small(part, request):
-        if part.n_supersegments > most:
-            raise DeviceMemoryError("the device is too small")
-        drawn.append(part)
-        return render_vdi(part, request)
-
-    monkeypatch.setattr(raycast, "render_vdi", small)
-    found = pvdi.render(vdi, vdi.camera, (70, 60))
-    assert len(drawn) >= 4
-    assert np.abs(found - expected).mean() < 1e-6
-    most = -1
-    with pytest.raises(DeviceMemoryError, match="too small"):
-        pvdi.render(vdi, vdi.camera, SIZE)

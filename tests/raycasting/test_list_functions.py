@@ -9,9 +9,8 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-import pytest
 
-from pyvista_vdi.raycasting.kernels import FRAME
+from pyvista_vdi.raycasting.kernels import RAYCAST
 
 FILE = "list_functions.cl"
 
@@ -71,37 +70,8 @@ def test_small_lists_exhaustively(call):
     check(call, lists, queries)
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-def test_long_lists(call, sign):
-    """Lists of up to 300 random supersegments, at depths on, between and beyond the faces.
-
-    Depth coordinates are negative with -1/Z and positive with Z.
-    """
-    rng = np.random.default_rng(11)
-    lists, queries = [], []
-    for which, n in enumerate([0, 1, 5, 40, 65, 128, 255, 256, 300]):
-        faces = np.sort(rng.choice(100_000, 2 * n, replace=False).astype(np.float32) / 1000)
-        faces = np.sort(sign * faces).reshape(n, 2)
-        touching = rng.random(n) < 0.3  # begins where the one before ends
-        touching[:1] = False
-        faces[touching, 0] = faces[np.flatnonzero(touching) - 1, 1]
-        lists.append(faces.tolist())
-        on_faces = rng.choice(faces.ravel(), min(12, 2 * n), replace=False) if n else []
-        middles = sign * rng.uniform(0, 100, 12).astype(np.float32)
-        ends = [-np.inf, np.inf, -1e30, 1e30, 0.0]
-        for depth in np.concatenate([on_faces, middles, ends]).astype(np.float32).tolist():
-            guesses = range(n) if n == 40 else rng.integers(0, n + 1, 8).tolist()
-            for away in (False, True):
-                near = linear_scan(lists[-1], depth, away) + np.arange(-3, 4)
-                near = near[near >= 0].tolist()
-                for guess in {*guesses, *near, 0, n, n + 1, n + 1000, 2**31 - 1}:
-                    queries.append((which, depth, away, int(guess)))
-    assert len(queries) > 4000
-    check(call, lists, queries)
-
-
 def test_a_frame_lies_on_the_device_as_on_the_host(call):
-    offsets = [FRAME.dtype.fields[name][1] for name in FRAME.fields]
-    expected = [*offsets, FRAME.dtype.itemsize]
+    frame = RAYCAST.parameters({})["frame"].dtype
+    expected = [*(frame.fields[name][1] for name in frame.names), frame.itemsize]
     found = call(FILE, "frame_layout", len(expected), call.empty(len(expected), dtype=np.int32))
     assert found.tolist() == expected

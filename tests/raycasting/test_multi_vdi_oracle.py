@@ -14,17 +14,15 @@ import numpy as np
 import pytest
 import reference
 import strategies
-from drawing import owned_image, render_vdi, render_vdis
+from drawing import owned_image, render_vdis
 from extreme_scenes import slabs_vdi
 from oracle import assert_explained
-from ray_scenes import random_ends, with_some
+from ray_scenes import random_ends
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import Camera, Cropping, InvalidArgumentError
-from pyvista_vdi.model.ray_forms import cells_of_points
-from pyvista_vdi.raycasting import multi_vdi
 from pyvista_vdi.raycasting.multi_vdi import PlacedVDI
-from pyvista_vdi.raycasting.prepared import OccupancyGrid, prepared_vdi
+from pyvista_vdi.raycasting.prepared import OccupancyGrid
 
 #: Largest difference per channel from the oracle; see above.
 TOLERANCE = 4e-5
@@ -87,24 +85,35 @@ def check(vdis, cameras, size, image, name, **ends):
     )
 
 
-@in_two_ways
-@pytest.mark.every(6)
-@pytest.mark.parametrize("kind", [*strategies.VIEWS[2:], *strategies.VIEWS[:2]])
-def test_every_pixel_is_within_the_range_of_the_moved_rays(runtime, kind, dealt):
+@pytest.mark.parametrize(
+    ("kind", "dealt", "skip"),
+    [
+        ("near", "blocks", False),
+        ("half", "one by one", True),
+        ("beside", "blocks", True),
+        ("inside", "one by one", False),
+        ("far", "blocks", True),
+    ],
+    indirect=["dealt"],
+)
+def test_every_pixel_is_within_the_range_of_the_moved_rays(runtime, kind, dealt, skip, monkeypatch):
+    monkeypatch.setattr(OccupancyGrid, "worthwhile", skip)
     moved = drawn = pixels = 0
-    for case in range(5):
+    for case in range(3):
         seed = [case, strategies.VIEWS.index(kind), 7]
         vdis, cameras, size = scene(seed, kind, 2 + case % 2)
+        if case == 2:  # of several cells, in some of which but one is met; and another form
+            vdis[1], size = vdis[1].with_precision("8-byte"), (2 * size[0], 40)
         image = draw(runtime, vdis, cameras, size)
         result = check(vdis, cameras, size, image, f"seed {seed}, view {kind!r}")
         moved, drawn, pixels = moved + result.moved, drawn + result.drawn, pixels + result.pixels
-    assert drawn > pixels / 10  # a comparison of nothing with nothing proves nothing
+    assert drawn > pixels / 20  # a comparison of nothing with nothing proves nothing
     assert moved <= MAX_SHARE.get(kind, 0.01) * pixels
 
 
-@in_two_ways
-@pytest.mark.every(2)
-@pytest.mark.parametrize("kind", ["around", "parallel", "near", "inside"])
+@pytest.mark.parametrize(
+    ("kind", "dealt"), [("around", "blocks"), ("near", "one by one")], indirect=["dealt"]
+)
 def test_ends_of_rays_and_each_vdi_s_own_looks(runtime, kind, dealt):
     """Opaque depth, and clipping planes, cropping and density of each, in either order."""
     vdis, cameras, size = scene([len(kind), 8], kind)
@@ -115,7 +124,7 @@ def test_ends_of_rays_and_each_vdi_s_own_looks(runtime, kind, dealt):
     cuts = low + np.sort(rng.uniform(0.1, 0.9, size=(2, 3)), axis=0) * (high - low)
     fence, cross = (Cropping(cuts.T.ravel(), name) for name in ("inverted_fence", "cross"))
     looks = {
-        "cropping": [fence, cross if kind in ("around", "inside") else None],
+        "cropping": [fence, cross if kind == "around" else None],
         "opacity_multiplier": [1.0, float(rng.uniform(0.2, 3))],
     }
     plain = draw(runtime, vdis, cameras, size)
@@ -137,8 +146,8 @@ def test_ends_of_rays_and_each_vdi_s_own_looks(runtime, kind, dealt):
 
 
 @in_two_ways
-@pytest.mark.parametrize("count", [2, 4])
-def test_the_order_of_the_vdis_changes_no_bit(runtime, count, dealt):
+def test_the_order_of_the_vdis_changes_no_bit(runtime, dealt):
+    count = 3
     vdis, cameras, size = scene([count, 10], "near", count)
     cut = [None, *([[[0, 0, 0, 1, 1, 1]]] * (count - 1))]
     images = [
@@ -152,56 +161,6 @@ def test_the_order_of_the_vdis_changes_no_bit(runtime, count, dealt):
         for order in itertools.permutations(range(count))
     ]
     assert len(set(images)) == 1
-
-
-@in_two_ways
-def test_passing_by_what_is_empty_changes_no_bit(runtime, monkeypatch, dealt):
-    monkeypatch.setattr(OccupancyGrid, "worthwhile", True)
-    vdis, cameras, size = scene(11, "beside")
-    image = draw(runtime, vdis, cameras, size)
-    assert np.array_equal(image, draw(runtime, vdis, cameras, size, skip_empty=False))
-
-
-@in_two_ways
-@pytest.mark.every(5)
-@pytest.mark.parametrize("kind", strategies.VIEWS)
-def test_a_vdi_in_parts_is_the_whole(runtime, kind, dealt):
-    """Disjoint halves; the same medium twice, half as dense; itself and nothing.
-
-    Where rays cross more than the first frame has room for, as lists of 200 do, it is drawn again,
-    and the next frame has room for it.
-    """
-    rng = np.random.default_rng([strategies.VIEWS.index(kind), 13])
-    vdi = strategies.random_vdi(rng, max_supersegments=200 if kind == "same" else 12)
-    camera, size = strategies.random_view(rng, vdi, kind)
-    whole = render_vdi(vdi, camera, size, device=runtime)
-    assert whole.any()
-    first = rng.random(vdi.n_supersegments) < 0.5
-    every = np.ones(vdi.n_supersegments, dtype=bool)
-    parts = {
-        "disjoint": [with_some(vdi, first), with_some(vdi, ~first)],
-        "half as dense": [with_some(vdi, every, 0.5), with_some(vdi, every, 0.5)],
-        "a quarter, a quarter and a half": [with_some(vdi, every, s) for s in (0.25, 0.25, 0.5)],
-        "itself and nothing": [vdi, with_some(vdi, ~every)],
-    }
-    for name, members in parts.items():
-        image = render_vdis(members, camera, size, device=runtime)
-        assert np.abs(image - whole).max() <= SAME, name
-        np.testing.assert_array_equal(render_vdis(members, camera, size, device=runtime), image)
-
-
-def test_one_vdi_is_drawn_as_ever(runtime):
-    rng = np.random.default_rng(14)
-    vdi = strategies.random_vdi(rng)
-    camera, size = strategies.random_view(rng, vdi, "near")
-    alone = render_vdi(vdi, camera, size, device=runtime)
-    assert np.array_equal(pvdi.render([vdi], camera, size, device=runtime), alone)
-    matrix = np.diag([2.0, 1.0, 0.5, 1.0])
-    moved = camera.replace(model_transform=matrix)
-    assert np.array_equal(
-        pvdi.render(vdi, camera, size, model_transforms=[matrix], device=runtime),
-        pvdi.render(vdi, moved, size, device=runtime),
-    )
 
 
 @in_two_ways
@@ -242,76 +201,6 @@ def test_owners_are_the_first_that_surely_cover(runtime, dealt):
     assert (owned_image([left, right], size, device=runtime).owner[:, 8] == 0).all()
     assert (owned_image([left, left], size, device=runtime).owner[:, 9:] == -1).all()
     assert (first.owner[:, 0] == 0).all()
-
-
-def side_by_side(rng, precisions):
-    """VDIs that overlap one after the other, in a window of many cells."""
-    camera = Camera((0, 0, 9), (0, 0, 0), (0, 1, 0), view_angle=40)
-    placed = []
-    for k in range(3):
-        matrix = np.eye(4)
-        matrix[:3, 3] = (1.9 * k - 1.9, 0.9 * k - 0.9, -0.2 * k)
-        own = Camera((rng.uniform(-2, 2), rng.uniform(-2, 2), 6), (0, 0, 0), (0, 1, 0))
-        vdi = strategies.random_vdi(rng, window=(96, 72), camera=own, bounds=BOUNDS)
-        vdi = vdi.with_precision(precisions[k % len(precisions)])
-        placed.append(PlacedVDI(vdi, camera.replace(model_transform=matrix)))
-    return placed, (323, 187)
-
-
-def of_cells(values, size):
-    """A value for each cell, bottom row first, for each of its pixels, top row first."""
-    return np.repeat(np.repeat(values, 16, axis=0), 16, axis=1)[: size[1], : size[0]][::-1]
-
-
-@pytest.mark.every(6)
-@pytest.mark.parametrize("precisions", [("exact",), ("exact", "8-byte")])
-def test_where_no_two_are_met_each_is_drawn_as_by_itself(runtime, dealt, precisions, monkeypatch):
-    placed, size = side_by_side(np.random.default_rng(17), precisions)
-    depth = np.full(size[::-1], np.inf, np.float32)
-    depth[60:110] = 8.5
-    shown = {"opaque_depth": depth, "device": runtime}
-    met = np.array(
-        [
-            cells_of_points(one.camera, size, prepared_vdi(runtime, one.vdi).occupancy.corners, 16)
-            for one in placed
-        ]
-    )
-    count = of_cells(met.sum(axis=0), size)
-    assert set(np.unique(count)) >= {0, 1, 2}
-    drawn = owned_image(placed, size, margin=0.5, **shown)
-    seen, alone = drawn.image.any(axis=-1), 0
-    for number, one in enumerate(placed):
-        here = (count == 1) & of_cells(met[number], size)
-        if dealt != "packets":  # whose rays two packets may share: those of another part differ
-            own = render_vdi(one.vdi, one.camera, size, **shown)
-            np.testing.assert_array_equal(drawn.image[here], own[here])
-        np.testing.assert_array_equal(drawn.owner[here], np.where(seen, number, -1)[here])
-        alone += (here & seen).any()
-    assert alone >= 2
-    assert not seen[count == 0].any()
-    assert (drawn.owner[count == 0] == -1).all()
-    # What several are met in is drawn as if several were met everywhere, and so is the rest; that
-    # is drawn in bands of cells
-    monkeypatch.setattr(multi_vdi, "cells_of_points", lambda *_: np.ones_like(met[0]))
-    whole = owned_image(placed, size, margin=0.5, **shown)
-    np.testing.assert_array_equal(whole.image[count > 1], drawn.image[count > 1])
-    assert np.abs(whole.image - drawn.image).max() <= SAME
-    np.testing.assert_array_equal(whole.owner, drawn.owner)
-    turned = owned_image(placed[::-1], size, margin=0.5, **shown)
-    np.testing.assert_array_equal(turned.image, whole.image)
-
-
-def test_nothing_is_met_beside_a_vdi_s_cells(default_runtime):
-    for seed in range(30):
-        rng = np.random.default_rng([seed, 18])
-        vdi = strategies.random_vdi(rng)
-        camera, _ = strategies.random_view(rng, vdi, strategies.VIEWS[seed % len(strategies.VIEWS)])
-        size = (int(rng.integers(1, 150)), int(rng.integers(1, 120)))
-        corners = prepared_vdi(default_runtime, vdi).occupancy.corners
-        met = cells_of_points(camera, size, corners, 16)
-        assert met.shape == (-(-size[1] // 16), -(-size[0] // 16))
-        image = render_vdi(vdi, camera, size, skip_empty=False, device=default_runtime)
-        assert not image[~of_cells(met, size)].any(), seed
 
 
 ONE = slabs_vdi(CAMERA, [4.5, 5.5], 0.7, bounds=BOUNDS)

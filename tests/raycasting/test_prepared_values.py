@@ -6,10 +6,10 @@ import pickle
 
 import numpy as np
 import pytest
-from strategies import random_vdi
+from strategies import kept_values, random_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import DeferredVDI, TransferFunction
+from pyvista_vdi import TransferFunction
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.raycasting.prepared import PreparedVDI, prepared_vdi
 
@@ -19,52 +19,15 @@ COLORS = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 def kept(seed, precision="exact"):
     lists = random_vdi(np.random.default_rng(seed), max_supersegments=5)
     mean, spread, share = lists.color.T
-    return DeferredVDI(
-        lists.camera,
-        lists.window_size,
-        lists.offsets,
-        lists.front,
-        lists.back,
-        mean,
-        spread / 8,
-        share,
-        lists.bounds,
-        value_range=(100, 300),
-        unit_distance=2.0,
-        sample_distance=0.5,
-        depth_origin=lists.depth_origin,
-    ).with_precision(precision)
+    return kept_values(lists, mean, spread / 8, share).with_precision(precision)
 
 
-@pytest.mark.parametrize("degrees", [0, 5, 30])
-def test_what_a_look_leaves_unwritten_is_never_seen(runtime, degrees, monkeypatch):
-    """Lists move up where others are transparent; memory behind them may hold anything."""
-    made = type(runtime).result
-
-    def unwritten(self, *arguments, **options):
-        buffer = made(self, *arguments, **options)
-        if buffer.name in ("supersegment media", "supersegment faces"):
-            runtime.fill(buffer, np.float32(np.nan))
-        return buffer
-
-    monkeypatch.setattr(type(runtime), "result", unwritten)
-    z, y, x = np.mgrid[-1:1:24j, -1:1:24j, -1:1:24j]
-    volume = pvdi.Volume(np.exp(-3 * (x**2 + y**2 + z**2)).astype(np.float32))
-    camera = pvdi.Camera((11, -70, 30), (11, 11, 11), (0, 0, 1))
-    deferred = pvdi.generate(volume, camera, (64, 48), classification="deferred", device=runtime)
-    look = TransferFunction(COLORS, [0, 0.5, 0], (0.4, 0.6))
-    shown = classify_on_device(deferred, look, runtime)
-    picture = pvdi.render(shown, camera.azimuth(degrees), device=runtime)
-    assert picture[..., 3].max() > 0.3
-    assert np.isfinite(picture).all()
-
-
-@pytest.mark.parametrize("opacities", [[0.1, 0.8, 0.3], [0, 0, 0, 0.9], [1, 0, 0], [0, 0]])
+@pytest.mark.parametrize("opacities", [[0.1, 0.8, 0.3], [0, 0, 0, 0.9]])
 @pytest.mark.parametrize("precision", ["exact", "8-byte"])
 def test_pictures_and_grids_are_those_of_the_arrays(runtime, precision, opacities):
     colors = np.resize(COLORS, (len(opacities), 3))
     look = TransferFunction(colors, opacities, (100, 300))
-    for seed in range(4):
+    for seed in range(2):
         vdi = classify_on_device(kept(seed, precision), look, runtime)
         drawn = prepared_vdi(runtime, vdi)
         picture = pvdi.render(vdi, vdi.camera, device=runtime)

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.compositing import Segment, composite, merge
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
+from reference.compositing import Segment, composite, merge
 from reference.raycast import HalfSpace, Ray, clip, inside_box, pixel_ray
 from reference.shading import (
     NodeOcclusion,
@@ -153,7 +153,7 @@ def build_vdi(
     as colour, so black material that changes density is not homogeneous. By homogeneity, lists are
     cut by :func:`.shading.cut_where_unlike`. Rendered at V_O the result equals :func:`volume_image`
     for any budget, with colours weighted by transmittance (see
-    :func:`pyvista_vdi.model.compositing.merge`).
+    :func:`reference.compositing.merge`).
 
     Depths are relative to the nearest depth of the bounds where the eye is outside them. Parameters
     are as for :func:`samples`; InvalidArgumentError if ``max_supersegments`` is not positive or the

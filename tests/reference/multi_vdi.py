@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.compositing import composite, optical_depth_over_length
 from pyvista_vdi.model.vdi import VDI
+from reference.compositing import composite, optical_depth_over_length
 from reference.ranges import (
     FACE_ROUNDINGS,
     RAY_ROUNDINGS,

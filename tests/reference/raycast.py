@@ -19,9 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.compositing import composite, optical_depth_over_length
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.vdi import VDI
+from reference.compositing import composite, optical_depth_over_length
 
 Array = NDArray[np.float64]
 

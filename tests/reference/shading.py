@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid, spread_directions
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.compositing import Segment, merge
 from pyvista_vdi.model.lighting import Light, Lights, Shading
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
+from reference.compositing import Segment, merge
 
 Array = NDArray[np.float64]
 
@@ -233,7 +233,7 @@ def cut_where_unlike(
     The threshold is the least, to a thousandth, that keeps the budget, ``limit``, on this ray,
     whose ``runs`` come nearest first; what lies between two of them is empty, and nothing is
     dropped. ``per_reference``: reference lengths (the smallest spacing) per unit of the segments'
-    depths; ``weighting`` as for :func:`pyvista_vdi.model.compositing.merge`.
+    depths; ``weighting`` as for :func:`reference.compositing.merge`.
     """
     if len(runs) <= limit:
         return list(runs)

@@ -10,7 +10,7 @@ from ray_scenes import rebuilt
 
 import reference
 from pyvista_vdi import Camera, InvalidArgumentError
-from pyvista_vdi.model.compositing import Segment, composite, split
+from reference.compositing import Segment, composite, split
 from reference.raycast import centre_ray_scale, near_limit
 
 #: Float64 rounding, grown by a few hundred operations and by media as thin as 1e-3 of the depth.

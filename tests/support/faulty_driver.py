@@ -124,10 +124,10 @@ DeviceBuffer.__init__ = _noted
 
 
 def state_of(runtime):
-    """What must be as before when something went wrong: buffers, memory, command queues."""
+    """What must be as before when something went wrong: buffers, memory."""
     gc.collect()
     living = sorted((buffer.name, buffer.nbytes) for buffer in _BUFFERS if not buffer.released)
-    return living, runtime.allocated, len(runtime._queues)
+    return living, runtime.allocated
 
 
 def same(first, second):

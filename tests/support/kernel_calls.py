@@ -6,13 +6,9 @@ from contextlib import ExitStack
 
 import numpy as np
 
-from pyvista_vdi.device import DeviceBuffer, KernelDeclaration, padded
-from pyvista_vdi.device.programs import SCALARS
-from pyvista_vdi.volume.kernels import CLASSIFIED, RAYS
+from pyvista_vdi.device import KernelDeclaration, padded
 
 GROUP = 64
-STRUCTS = (CLASSIFIED, RAYS)
-TYPES = {number.name: name for name, number in SCALARS.items()}
 
 
 class Output:
@@ -46,9 +42,9 @@ class Caller:
         is in ``by_value`` (vectors and structures).
         """
         with ExitStack() as stack:
-            kinds, given, written = {"items": "int"}, {}, []
+            given, written = [items], []
             for place, argument in enumerate(arguments):
-                value, name = argument, f"a{place}"
+                value = argument
                 if isinstance(argument, Output):
                     values = argument.values
                     value = stack.enter_context(self._runtime.buffer(values.shape, values.dtype))
@@ -56,15 +52,10 @@ class Caller:
                     written.append(value)
                 elif isinstance(argument, np.ndarray) and place not in by_value:
                     value = stack.enter_context(self._runtime.upload(argument))
-                count = np.size(value) if isinstance(value, np.ndarray) else 1
-                star = "*" if isinstance(value, DeviceBuffer) else ""
-                given[name] = value
-                if value.dtype.names:
-                    kinds[name] = next(kind for kind in STRUCTS if kind.dtype == value.dtype)
-                    continue
-                kinds[name] = f"{TYPES[value.dtype.name]}{count if count > 1 else ''}{star}"
-            declaration = KernelDeclaration(self._folder / file, kernel, **kinds)
-            launch = self._runtime.bind(declaration, defines, items=items, **given)
+                given.append(value)
+            declaration = KernelDeclaration(self._folder / file, kernel)
+            named = dict(zip(declaration.parameters(defines), given, strict=True))
+            launch = self._runtime.bind(declaration, defines, **named)
             launch(padded(items, GROUP), GROUP)
             results = [self._runtime.download(buffer) for buffer in written]
         return results[0] if len(results) == 1 else results

@@ -12,10 +12,8 @@ from mpi4py import MPI
 
 from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError, VDIFileError
 from pyvista_vdi.extensions.insitu import InSitu
-from pyvista_vdi.model.standard_cases import filling_camera
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from support import moving_field
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
 COMM = MPI.COMM_WORLD
@@ -74,12 +72,7 @@ WRONG = (
 )  # fmt: skip
 
 
-def all_mistakes(folder):
-    """What :func:`mistakes` does, with each value."""
-    mistakes(folder, every=1)
-
-
-def mistakes(folder, every=4):
+def mistakes(folder, every=8):
     """One rank is given something wrong, each argument in turn: all raise the same, or none does.
 
     A rank that waits is ended by the alarm, and by that the test.
@@ -141,24 +134,11 @@ def series(folder):
         assert len(show.seconds) == 2
 
 
-def deferred(folder):
-    """Write 25 steps of values in four slabs, as a series."""
-    cuts = np.linspace(0, moving_field.N, COMM.size + 1).astype(int)
-    low, high = cuts[COMM.rank], cuts[COMM.rank + 1]
-    view = filling_camera((-1, 1) * 3, moving_field.SIZE), moving_field.SIZE
-    options = {**moving_field.GRID, **moving_field.KEPT, "comm": COMM}
-    with InSitu(folder / "kept.vdis", *view, (moving_field.N,) * 3, **options) as show:
-        for step in range(moving_field.STEPS):
-            show(moving_field.values_at(step, slice(low, high)), (0, 0, low), 0.5 * step)
-
-
 if __name__ == "__main__":
     for case in sys.argv[1].split(","):
         {
             "same": same,
             "failing": failing,
             "mistakes": mistakes,
-            "all_mistakes": all_mistakes,
             "series": series,
-            "deferred": deferred,
         }[case](Path(sys.argv[2]))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from pyvista_vdi.model import compositing
-from pyvista_vdi.model.compositing import Segment
+from reference import compositing
+from reference.compositing import Segment
 
 EPS = 2.0**-24  # unit roundoff of float32
 FRONT, BACK, TAU, TRANSMITTANCE = range(4)

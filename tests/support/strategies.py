@@ -13,6 +13,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
@@ -321,3 +322,29 @@ def colors():
 
 def _unit(vector):
     return np.asarray(vector) / np.linalg.norm(vector)
+
+
+def kept_values(
+    lists,
+    mean,
+    spread,
+    share,
+    *,
+    value_range=(100, 300),
+    unit_distance=2.0,
+    sample_distance=0.5,
+    importance=None,
+    metadata=None,
+):
+    """Return a DeferredVDI of some lists, with these values in place of their colours."""
+    about = {
+        "version": 1,
+        "value_range": value_range,
+        "unit_distance": unit_distance,
+        "sample_distance": sample_distance,
+        "importance": importance,
+    }
+    faces = lists.camera, lists.window_size, lists.offsets, lists.front, lists.back
+    color = np.stack([mean, np.zeros_like(mean), share], axis=1)
+    told = {"depth_origin": lists.depth_origin, "metadata": metadata or lists.metadata}
+    return DeferredVDI(VDI(*faces, color, spread, lists.bounds, **told), about)

@@ -26,8 +26,9 @@ def random_table(rng, entries):
     return rng.random((entries, 4)).astype(np.float32)
 
 
-@pytest.mark.parametrize("entries", [2, 3, 256, 4096])
-@pytest.mark.parametrize("span", [(0.0, 255.0), (-1000.0, 3095.0), (0.25, 0.75), (-1e-20, 1e20)])
+@pytest.mark.parametrize(
+    ("entries", "span"), [(2, (0.0, 255.0)), (256, (-1000.0, 3095.0)), (4096, (-1e-20, 1e20))]
+)
 def test_linear_between_entries_and_clamped_outside(call, entries, span):
     rng = np.random.default_rng(entries)
     low, high = np.float32(span)
@@ -73,13 +74,6 @@ def test_nan_is_transparent(call):
     for low, high in ((0.0, 1.0), (0.5, 0.5)):
         found = classified(call, [np.nan, -np.nan, 0.5], table, low, high)
         np.testing.assert_array_equal(found, [[0] * 4, [0] * 4, [1] * 4])
-
-
-@pytest.mark.parametrize("span", [(0.0, 1.0), (0.5, 0.5)])
-def test_one_entry_is_constant(call, span):
-    table = np.float32([[0.25, 0.5, 0.75, 0.125]])
-    found = classified(call, [-np.inf, -1e30, 0, 0.5, 1, 1e30, np.inf], table, *span)
-    np.testing.assert_array_equal(found, np.broadcast_to(table, (7, 4)))
 
 
 def test_step_optical_depth(call):

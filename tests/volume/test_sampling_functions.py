@@ -11,8 +11,8 @@ from pyvista_vdi.volume.rays import Variant
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "sampling_functions.cl"
 TYPES = {"uint8": "uchar", "int8": "char", "uint16": "ushort", "int16": "short", "float32": "float"}
-#: Every type, and indices of 64 bits with the shortest and the longest.
-KINDS = [*((dtype, "uint") for dtype in TYPES), ("uint8", "ulong"), ("float32", "ulong")]
+#: Types of which others differ in a number, and both kinds of indices.
+KINDS = [("int8", "uint"), ("uint16", "ulong"), ("float32", "uint")]
 
 
 def sampled(call, array, positions, nearest=False, index="uint"):

@@ -1,10 +1,7 @@
-"""A volume in a bare renderer, drawn by VTK's GPU mapper or by a VDI, and rows of a table."""
+"""A volume in a bare renderer, drawn by VTK's GPU mapper or by a VDI."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,64 +16,15 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkPiecewiseFunction,
     vtkRenderer,
     vtkRenderWindow,
+    vtkUniformGrid,
     vtkVolume,
     vtkVolumeProperty,
 )
 
 #: Points along each edge, and the picture's size, pixels.
 N, SIZE = 14, (96, 72)
-SAME, REFUSED, WITHOUT = "same", "refused", "without effect"
-
-
-@dataclass(frozen=True)
-class Row:
-    """What becomes of methods, or of an attribute.
-
-    Attributes
-    ----------
-    names : str
-        Methods, or what they have in common: ``Cropping`` stands for ``SetCropping`` and so on.
-    verdict : str
-        "same", "refused" or "without effect".
-    why : str
-        What there is to say about it.
-    change : callable, optional
-        Does it to a :class:`Scene`, drawn both ways. What it returns is compared, too.
-    words : str
-        A pattern of the refusal; by default the method's name is in it.
-    """
-
-    names: str
-    verdict: str
-    why: str = ""
-    change: Callable[[Any], Any] | None = None
-    words: str = ""
-
-    def __str__(self) -> str:
-        return self.names.partition(" ")[0]
-
-    def covers(self, method: str) -> int:
-        """Return how many letters of a method's name it names; 0 if it is none of its methods."""
-        before = "(Get|Set|Add|Remove|RemoveAll|GetNumberOf|Has|Is)?"
-        after = "(s|On|Off|MinValue|MaxValue|AsString|MTime|InDataCoords|To[A-Z0-9].*)?"
-        there = (
-            n for n in self.names.split() if re.fullmatch(before + re.escape(n) + after, method)
-        )
-        return max(map(len, there), default=0)
-
-
-def row_of(method: str, rows: Sequence[Row]) -> Row | None:
-    """Return the row that says most of a method; ``None`` if none does."""
-    best = max(rows, key=lambda row: row.covers(method))
-    return best if best.covers(method) else None
-
-
-def methods_of(kind: type, base: type) -> list[str]:
-    """Return the public methods of a class of VTK that another one lacks."""
-    own = (getattr(kind, name) for name in dir(kind))
-    named = {name for name, it in zip(dir(kind), own, strict=True) if callable(it)}
-    constants = {name for name in named if isinstance(getattr(kind, name), type)}
-    return sorted(n for n in named - constants - {*dir(base)} if n[0].isupper() and not n.isupper())
+#: Of pictures by VTK's mapper and by ours.
+LEAST_SSIM = 0.98
 
 
 def values() -> np.ndarray:
@@ -133,6 +81,46 @@ def another_property():
     made.SetColor(colors((0, 1, 0, 0), (200, 0, 0, 1)))
     made.SetScalarOpacity(function((0, 0.3), (255, 0)))
     return made
+
+
+def image_with(change):
+    """Return what gives a scene an image that was changed."""
+
+    def changed(s):
+        image = image_of()
+        another = change(image)
+        if s.ours:
+            s.source.SetInputDataObject(image if another is None else another)
+        else:
+            s.mapper.SetInputDataObject(image if another is None else another)
+        s.renderer.ResetCamera()
+
+    return changed
+
+
+def with_scalars(make):
+    """Return a change to an image of other scalars, made of 0 to 255."""
+    return image_with(lambda image: image_of(make(values().ravel())))
+
+
+def blanked(image):
+    grid = vtkUniformGrid()
+    grid.DeepCopy(image)
+    for number in range(0, N**3, 7):
+        grid.BlankPoint(number)
+    for number in range(0, (N - 1) ** 3, 31):
+        grid.BlankCell(number)
+    return grid
+
+
+def rgba(numbers):
+    """Return four components of these."""
+    return np.stack([numbers, 255 - numbers, numbers / 2, numbers], -1).astype(np.uint8)
+
+
+def as_rgba(s):
+    s.prop.IndependentComponentsOff()
+    with_scalars(rgba)(s)
 
 
 class Scene:

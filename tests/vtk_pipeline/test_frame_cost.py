@@ -7,7 +7,6 @@ import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, opaque_sphere, shown, soft_ball
 
-from pyvista_vdi.device import get_runtime
 from pyvista_vdi.vtk_pipeline.drawing import frame as frame_module
 from pyvista_vdi.vtk_pipeline.drawing import images
 from pyvista_vdi.vtk_pipeline.drawing import screen as texture_module
@@ -58,25 +57,6 @@ def plotter():
     plotter.close()
 
 
-@pytest.fixture
-def from_x(plotter):
-    """Seen along -x, y to the right, 22.5 pixels for a unit."""
-    plotter.camera_position = ((8, 0, 0), (0, 0, 0), (0, 0, 1))
-    plotter.enable_parallel_projection()
-    plotter.camera.parallel_scale = 2.0
-    return plotter
-
-
-def fresh_picture(plotter):
-    """The picture of the same scene by a plotter that has kept nothing."""
-    other = pv.Plotter(window_size=WINDOW)
-    other.add_vdi(plotter.volume.vdi, show_scalar_bar=False)
-    other.camera = plotter.camera.copy()
-    image = shown(other)
-    other.close()
-    return image
-
-
 @pytest.mark.parametrize("opaque", [False, True])
 def test_a_view_that_has_not_changed_costs_nothing(plotter, counts, opaque):
     if opaque:
@@ -89,44 +69,6 @@ def test_a_view_that_has_not_changed_costs_nothing(plotter, counts, opaque):
     plotter.render_window.Render()
     plotter.render()
     assert counts == before
-
-
-def test_what_moves_allocates_nothing(plotter, counts):
-    plotter.show(auto_close=False)
-    for _ in range(frame_module.KEPT + 1):
-        plotter.camera.Azimuth(3)
-        plotter.render()
-    raycasts = counts["render_vdi"]
-    assert counts["aligned_empty"] == frame_module.KEPT + 1
-    for _ in range(6):
-        plotter.camera.Azimuth(3)
-        plotter.render()
-    assert counts["render_vdi"] == raycasts + 6
-    assert counts["aligned_empty"] == frame_module.KEPT + 1
-    np.testing.assert_array_equal(shown(plotter), fresh_picture(plotter))
-
-
-def test_a_mesh_that_moves_allocates_nothing(plotter, counts):
-    sphere = plotter.add_mesh(pv.Sphere(radius=0.5), reset_camera=False)
-    plotter.show(auto_close=False)
-    for at in np.linspace(0, 0.6, 8):
-        sphere.position = (at, 0, 0)
-        plotter.render()
-    assert counts["render_vdi"] == 8  # the first is where it was
-    assert counts["aligned_empty"] == 2
-
-
-def test_images_that_are_kept_are_not_drawn_over(plotter):
-    """Views come again in another order, while the memory of others is used again."""
-    plotter.show(auto_close=False)
-    views = [30.0 * i for i in range(frame_module.KEPT + 2)]
-    pictures = {}
-    for view in [*views, *views[::-1], *views[::2], *views]:
-        plotter.camera_position = VIEW
-        plotter.camera.Azimuth(view)
-        image = shown(plotter)
-        np.testing.assert_array_equal(pictures.setdefault(view, image), image)
-    assert len({image.tobytes() for image in pictures.values()}) == len(views)
 
 
 def changes_of_what_is_opaque(plotter, sphere):
@@ -164,87 +106,3 @@ def test_depth_is_read_again_when_what_is_opaque_changes(plotter, counts, monkey
             patch.setattr(OpaqueDepths, "read", lambda _, frames: read(OpaqueDepths(), frames))
             np.testing.assert_array_equal(shown(plotter), after, err_msg=name)
         before = after
-
-
-def test_only_what_can_hide_the_vdi_is_read(from_x, monkeypatch):
-    areas = []
-    read = frame_module.Frame.opaque_z
-    monkeypatch.setattr(
-        frame_module.Frame, "opaque_z", lambda self, area: areas.append(area) or read(self, area)
-    )
-    beside = pv.Sphere(radius=0.2, center=(1, -1.9, 1.7))
-    from_x.add_mesh(beside, reset_camera=False, name="beside")
-    from_x.add_mesh(pv.Sphere(center=(-4, 0, 0)), reset_camera=False, name="behind")
-    from_x.add_mesh(pv.Sphere(), opacity=0.5, reset_camera=False, name="translucent")
-    from_x.add_axes()
-    from_x.add_text("words")
-    from_x.show(auto_close=False)
-    assert areas == []
-    for name in ("beside", "behind", "translucent"):
-        from_x.remove_actor(name)
-    from_x.add_mesh(pv.Cube(center=(1, 0.5, 0)).scale((1, 0.2, 0.2)), reset_camera=False)
-    from_x.render()
-    ((left, bottom, right, top),) = areas
-    # y from 0 to 0.2 to the right; 5 pixels for points, which are 5 wide, and 2 for rounding
-    places = np.array([60, 45 - 0.1 * 22.5, 60 + 0.2 * 22.5, 45 + 0.1 * 22.5])
-    wider = [1, 1, -1, -1] * (places - [left, bottom, right, top])
-    assert (wider >= 7).all()
-    assert (wider < 8).all()
-    areas.clear()
-    from_x.add_mesh(pv.Sphere(radius=0.2, center=(1, -1.8, 1.8)), reset_camera=False)
-    from_x.render()
-    assert areas[-1][0] < 45 < areas[-1][2]  # around both, but no further than the VDI
-    assert areas[-1][3] <= 45 + 22.5 + 3
-
-
-def test_a_prop_that_nobody_knows_is_always_read(plotter, counts):
-    """A shader of its own may draw elsewhere, and change with what has no time."""
-    opaque_sphere(plotter)
-    sphere = next(a for a in plotter.actors.values() if isinstance(a, pv.Actor))
-    tag = "//VTK::PositionVC::Dec"
-    sphere.GetShaderProperty().AddVertexShaderReplacement(tag, True, f"{tag}\n", False)
-    plotter.show(auto_close=False)
-    reads = counts["opaque_z"]
-    plotter.render()
-    assert counts["opaque_z"] == reads + 1
-    assert counts["render_vdi"] == 1  # it is as it was
-
-
-def test_vtk_copies_no_depth(plotter, monkeypatch):
-    made = []
-
-    class Texture(vtkTextureObject):
-        def CreateDepthFromRaw(self, *args):
-            made.append(self)
-            return super().CreateDepthFromRaw(*args)
-
-    monkeypatch.setattr(texture_module, "vtkTextureObject", Texture)
-    plotter.show(auto_close=False)
-    drawing, (texture,) = plotter.volume.mapper.driver, made
-    assert (texture.GetWidth(), texture.GetHeight()) == (1, 1)
-    assert texture.GetReferenceCount() == 2  # ours, and the mapper's
-    drawing.release()
-    assert texture.GetHandle() == 0
-    plotter.render()
-    assert texture.GetHandle() != 0
-
-
-def test_cpu_devices_draw_where_vtk_uploads_from(plotter, monkeypatch):
-    if not get_runtime().is_cpu:
-        pytest.skip("a GPU draws into memory of its own")
-    targets, uploads = [], []
-    kind = type(get_runtime())
-    target, show = kind.target, texture_module.ImageTexture.show
-    monkeypatch.setattr(kind, "target", lambda *args: targets.append(target(*args)) or targets[-1])
-    monkeypatch.setattr(
-        texture_module.ImageTexture,
-        "show",
-        lambda self, window, image, *a, **k: (
-            uploads.append(image) or show(self, window, image, *a, **k)
-        ),
-    )
-    plotter.show(auto_close=False)
-    uploaded = [buffer for buffer in targets if buffer.name == "image"]  # others are of the new VDI
-    assert [buffer.host is not None for buffer in uploaded] == [True]
-    assert uploaded[0].host.base is not None
-    assert np.shares_memory(uploaded[0].host, uploads[-1])

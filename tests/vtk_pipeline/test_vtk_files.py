@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 import pyvista as pv
 import strategies
-from hypothesis import given, settings
-from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError, VDIFileError
+from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline import (
     vdi_from_image,
@@ -75,7 +73,6 @@ def vdi_of_hard_numbers():
 
 VDIS = {
     "some": some_vdi,
-    "one supersegment per list": lambda: some_vdi(2, max_supersegments=1),
     "empty": empty_vdi,
     "hard numbers": vdi_of_hard_numbers,
 }
@@ -95,11 +92,8 @@ def assert_same(vdi, expected, *, text=False):
     ("mode", "compressor"),
     [
         ("Ascii", "None"),  # text is not compressed
-        ("Binary", "None"),
         ("Binary", "ZLib"),
-        ("Appended", "None"),
         ("Appended", "LZ4"),
-        ("Appended", "LZMA"),
     ],
 )
 @pytest.mark.parametrize("kind", VDIS)
@@ -123,30 +117,6 @@ def test_files_of_vtk_and_pyvista_keep_every_bit(kind, mode, compressor, tmp_pat
         assert_same(back, vdi, text=text)
 
 
-@given(strategies.SEEDS)
-@settings(max_examples=20)
-def test_any_vdi_in_its_form(seed):
-    vdi = some_vdi(seed, max_window=(9, 7))
-    assert_same(vdi_from_image(vdi_to_image(vdi)), vdi)
-
-
-def test_our_reading_and_saving_name_vtks(tmp_path):
-    path = tmp_path / "v.vti"
-    with pytest.raises(VDIFileError, match=r"wrap\(.*vdi_to_image\(vdi\)\)\.save"):
-        some_vdi().save(path)
-    assert not list(tmp_path.iterdir())
-    pv.wrap(vdi_to_image(some_vdi())).save(path)
-    with pytest.raises(VDIFileError, match=r"vdi_from_image\(pyvista\.read\(path\)\)"):
-        pvdi.read(path)
-
-
-def test_an_image_outlives_the_vdi_whose_memory_it_shares():
-    image = vdi_to_image(some_vdi(3, window=(50, 40)))
-    junk = [np.full(10_000, 7.0) for _ in range(50)]
-    assert vdi_from_image(image).equals(some_vdi(3, window=(50, 40)))
-    assert len(junk) == 50
-
-
 def text_with(image, **changes):
     return json.dumps({**json.loads(image.field_data["vdi"][0]), **changes})
 
@@ -165,7 +135,6 @@ def counting(value):
 DAMAGES = {
     "plain": (lambda i: i.field_data.remove("vdi"), "not a VDI: it has no field string 'vdi'"),
     "no backs": (lambda i: i.field_data.remove("back"), "lacks its field array 'back'"),
-    "no counts": (lambda i: i.point_data.remove("count"), "lacks its point array 'count'"),
     "no json": (described("{"), "description is damaged"),
     "no camera": (described('{"form_version": 1}'), "damaged.*camera"),
     "newer": (described({"form_version": 9}), "version 9.*update pyvista-vdi"),
@@ -174,11 +143,8 @@ DAMAGES = {
     "a list": (described("[]"), "description is damaged"),
     "deep": (described("[" * 9000), "description is damaged"),
     "version": (described({"form_version": "x"}), "damaged"),
-    "camera": (described({"camera": []}), "damaged.*list"),
-    "bounds": (described({"bounds": "x"}), "bounds must be"),
     "window": (lambda i: setattr(i, "dimensions", (60000, 60000, 1)), "60000 x 60000 x 1 points"),
     "planes": (lambda i: setattr(i, "dimensions", (4, 2, 2)), "4 x 2 x 2 points"),
-    "negative": (counting(-1), "whole numbers >= 0"),
     "nan": (counting(np.nan), "whole numbers >= 0"),
 }
 
@@ -189,28 +155,6 @@ def test_damaged_forms_are_refused(damage, message):
     damage(image)
     with pytest.raises(InvalidVDIError, match=message):
         vdi_from_image(image)
-
-
-@pytest.mark.gl
-def test_what_was_read_is_taken_everywhere(tmp_path):
-    plotter = pv.Plotter(off_screen=True, window_size=(80, 60))
-    vdi = soft_ball(12).vdi.generate(
-        pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1)), (80, 60), cmap="bone"
-    )
-    pv.wrap(vdi_to_image(vdi)).save(tmp_path / "v.vti")
-    image = pv.read(tmp_path / "v.vti")
-    np.testing.assert_array_equal(pvdi.render(image, vdi.camera), pvdi.render(vdi, vdi.camera))
-    actor = plotter.add_vdi(image)
-    assert actor.vdi.equals(vdi)
-    assert actor.vdi.metadata == vdi.metadata
-    plotter.screenshot(return_img=True)
-    plotter.close()
-    mapper = pvdi.VDIMapper()
-    for put in (mapper.SetInputData, mapper.SetInputDataObject):
-        put(image)
-        assert mapper.GetVDI().equals(vdi)
-    with pytest.raises(InvalidVolumeError, match="is a VDI in its VTK form, not a volume"):
-        pvdi.generate(image, vdi.camera, (8, 6), cmap="bone")
 
 
 def test_metadata_of_numpy_become_plain_and_others_are_refused():

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-import os
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 import pyvista as pv
@@ -34,20 +29,6 @@ from pyvista_vdi.vtk_pipeline.drawing import driver
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
-
-CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve().parents[2])
-
-#: What the table calls an event -> its test.
-EVENTS = {}
-
-
-def row(event):
-    def add(test):
-        assert event not in EVENTS
-        EVENTS[event] = test
-        return test
-
-    return add
 
 
 def auto(plotter, **options):
@@ -78,7 +59,6 @@ def looks_like(picture, actor, plotter):
 NEVER_KEPT = 1e6
 
 
-@row("nothing was drawn yet")
 def test_first(plotter, gate):
     actor = auto(plotter)
     assert (actor.status.drawn, actor.status.generation) == ("volume", 0)
@@ -96,7 +76,6 @@ def test_first(plotter, gate):
     other.close()
 
 
-@row("the VDI made in the background is ready")
 def test_ready(plotter, gate):
     actor = watched(plotter, regenerate=lambda status: status.angle > 20)
     before = turned(plotter, 40)
@@ -107,7 +86,6 @@ def test_ready(plotter, gate):
     np.testing.assert_array_equal(last, picture_of(actor.vdi, plotter))
 
 
-@row("the view moves")
 def test_moves(plotter, coarsest):
     actor = auto(plotter)
     turned(plotter, 3, MOVING)
@@ -139,29 +117,6 @@ def test_no_vdi_is_made_while_a_hand_moves_and_what_serves_goes_on_at_rest(
     assert actor.status.progress is not None
 
 
-@row("the view rests")
-def test_rests(plotter, coarsest):
-    actor = watched(plotter)
-    full = frame(plotter)
-    assert differs(turned(plotter, 30, MOVING), full)
-    plotter.camera.Azimuth(-30)
-    np.testing.assert_array_equal(frame(plotter), full)
-    assert (actor.status.mode, actor.status.share) == ("full", 1.0)
-
-
-@row("the view has moved where the VDI's picture is poor")
-def test_poor(plotter, gate, no_estimates):
-    actor = watched(plotter, regenerate="auto")
-    no_estimates.ssim = 0.5
-    before = turned(plotter, 60)
-    frames_until(plotter, lambda: actor.status.progress is not None)
-    np.testing.assert_array_equal(frame(plotter), before)
-    gate.set()
-    frames_until(plotter, lambda: actor.status.generation == 2)
-    assert actor.status.angle < 1e-6
-
-
-@row("data or look change")
 @pytest.mark.parametrize("show", [auto, watched, off_screen])
 def test_changes(plotter, gate, show):
     actor = show(plotter)
@@ -174,7 +129,6 @@ def test_changes(plotter, gate, show):
     assert (actor.status.progress is None) == (show is not watched)
 
 
-@row("it changes again while a VDI is made")
 def test_changes_again(plotter, gate):
     actor = watched(plotter)
     for cmap in ("inferno", "bone", "viridis_r"):
@@ -187,7 +141,6 @@ def test_changes_again(plotter, gate):
     assert actor.status.progress is None
 
 
-@row("a change is taken back")
 def test_taken_back(plotter, gate):
     actor = watched(plotter)
     before, vdi = frame(plotter), actor.vdi
@@ -199,7 +152,6 @@ def test_taken_back(plotter, gate):
     assert (actor.status.progress, actor.vdi) == (None, vdi)
 
 
-@row("making a VDI fails")
 def test_fails(plotter, monkeypatch):
     actor = watched(plotter)
     tries = []
@@ -225,7 +177,6 @@ def test_fails(plotter, monkeypatch):
     assert not differs(frame(plotter), picture_of(actor.vdi, plotter))
 
 
-@row("clipping planes, cropping or the opacity multiplier are set")
 @pytest.mark.parametrize("show", [watched, off_screen])
 def test_clips(plotter, show):
     actor = show(plotter)
@@ -241,7 +192,6 @@ def test_clips(plotter, show):
     assert (actor.vdi is vdi, actor.status.progress) == (True, None)
 
 
-@row("a picture is taken while the view moves")
 def test_picture(plotter, coarsest):
     actor = watched(plotter)
     full = turned(plotter, 20)
@@ -255,35 +205,6 @@ def test_picture(plotter, coarsest):
     assert actor.status.mode == "preview"
 
 
-@row("something is picked")
-@pytest.mark.parametrize("show", [watched, off_screen])
-def test_picked(plotter, show):
-    actor = show(plotter)
-    before = frame(plotter)
-    hit = actor.pick(WINDOW[0] // 2, WINDOW[1] // 2)
-    assert hit.position[0] > 0  # the side that is seen
-    np.testing.assert_array_equal(frame(plotter), before)
-
-
-@row("two volumes overlap in the picture")
-@pytest.mark.parametrize("seen", [True, False])
-def test_overlap(seen):
-    pictures = []
-    for order in (1, -1):
-        plotter = pv.Plotter(window_size=WINDOW)
-        for shift in (0.0, 0.9)[::order]:
-            actor = plotter.add_vdi(soft_ball(16), regenerate="never", **LOOKS)
-            actor.position = (shift, 0.3, 0)
-            actor.mapper.SetInteractiveOffScreen(seen)
-        plotter.camera_position = ((6, 1, 0), (0, 0, 0), (0, 0, 1))
-        plotter.show(auto_close=False)
-        pictures.append(frame(plotter))
-        assert {each.status.drawn for each in plotter.actors.values()} == {"vdi"}
-        plotter.close()
-    assert not differs(*pictures)
-
-
-@row("two renderers show one actor")
 def test_two_renderers(gate):
     gate.set()
     plotter = pv.Plotter(window_size=WINDOW, shape=(1, 2))
@@ -302,7 +223,6 @@ def test_two_renderers(gate):
     plotter.close()
 
 
-@row("a series plays")
 @pytest.mark.extension("series")
 def test_plays(plotter):
     actor = plotter.add_vdi(pvdi.VDISeries([small_vdi() for _ in range(3)]))
@@ -318,21 +238,6 @@ def test_plays(plotter):
     assert actor.step == step
 
 
-@row("a set of VDIs is turned")
-@pytest.mark.extension("sets")
-def test_set(plotter):
-    cameras = [pvdi.Camera((5, y, 0), (0, 0, 0), (0, 0, 1)) for y in (-4, 4)]
-    vdis = [pvdi.generate(soft_ball(12), each, (60, 50), **CLASSIFICATION) for each in cameras]
-    actor = plotter.add_vdi(pvdi.VDISet(vdis), regenerate="never", show_scalar_bar=False)
-    actor.mapper.SetInteractiveOffScreen(True)
-    for camera, vdi in zip(cameras, vdis, strict=True):
-        plotter.camera_position = (camera.position, (0, 0, 0), (0, 0, 1))
-        plotter.show(auto_close=False)
-        frame(plotter)
-        assert actor.vdi.camera.position == pytest.approx(vdi.camera.position)
-
-
-@row("the window is closed")
 def test_closed(gate):
     plotter = pv.Plotter(window_size=WINDOW)
     actor = auto(plotter, target_fps=NEVER_KEPT)
@@ -342,7 +247,6 @@ def test_closed(gate):
     assert not [name for name in ("generation", "estimate", "stand-in") if threads(name)]
 
 
-@row("it is shown again in another window")
 def test_again(plotter):
     first = pv.Plotter(window_size=WINDOW)
     actor = watched(first)
@@ -353,45 +257,3 @@ def test_again(plotter):
     plotter.show(auto_close=False)
     np.testing.assert_array_equal(frame(plotter), before)
     assert actor.status.generation == 1
-
-
-def test_the_page_has_these_events():
-    page = (CHECKOUT / "docs" / "dev" / "window_events.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (.+?) \|", page, re.MULTILINE)
-    assert [each for each in rows if each not in ("event", "---")] == list(EVENTS)
-
-
-DRIVES = (
-    "time",
-    "threading",
-    "asyncio",
-    "BackgroundThread",
-    "weakref",
-    "weakly",
-    "vtkWeakReference",
-)
-#: Where there may be threads, locks, clocks and weak references: what drives the frames of a mapper
-#: and a window; what VTK's objects, which observers and lights would keep in cycles, must not be
-#: kept alive by; and, of plotters, what they hold, their bar and the source that steps are read of.
-DRIVING = {
-    "vtk_pipeline/drawing": {"background", "driver", "mapper"},
-    "vtk_pipeline/interaction": {"browser", "status", "timer", "window"},
-    "vtk_pipeline/filters": {"algorithm", "source", "source_settings", "temporal", "view"},
-    "plotting": {
-        "actor",
-        "component",
-        "editor",
-        "progress",
-        "registration",
-    },
-}
-
-
-@pytest.mark.parametrize("room", DRIVING)
-def test_nothing_but_the_driver_has_threads_locks_clocks_or_weak_references(room):
-    for path in sorted((CHECKOUT / "pyvista_vdi" / room).glob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        imports = [n for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom)]
-        names = {each.name for node in imports for each in node.names}
-        names |= {str(node.module) for node in imports if isinstance(node, ast.ImportFrom)}
-        assert path.stem in DRIVING[room] or names.isdisjoint(DRIVES), path.name

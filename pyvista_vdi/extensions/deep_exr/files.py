@@ -18,10 +18,9 @@ from pyvista_vdi.errors import VDIError, VDIFileError, warn_external
 from pyvista_vdi.extensions.deep_exr.samples import media
 from pyvista_vdi.extensions.deep_exr.view import bounds_of_lists, camera_of, view_matrices
 from pyvista_vdi.io.progress import Pieces, Progress
-from pyvista_vdi.io.vdi_file.description import describe, from_json, number, to_json
+from pyvista_vdi.io.vdi_file.layout import describe, from_json, number, to_json
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.compositing import opacity
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import whole_file
 
@@ -36,7 +35,7 @@ def write(vdi: VDI, path: Any, *, progress: Progress | None = None) -> Path:
     shift = 0.0 - float(depths[0].min(initial=0.0)) if vdi.camera.parallel_projection else 0.0
     front, back = (np.maximum(depth + shift, 0).astype(np.float32) for depth in depths)
     back = np.maximum(back, np.nextafter(front, np.float32(np.inf)))  # as thin as float32 has it
-    alpha = opacity(vdi.optical_depth)
+    alpha = -np.expm1(-vdi.optical_depth.astype(np.float64))
     channels: dict[str, Any] = {"Z": front, "ZBack": back, "A": alpha, "tau": vdi.optical_depth}
     channels |= {name: vdi.color[:, k] * alpha for k, name in enumerate("RGB")}
     record = describe(vdi, VERSION) | {"depth_shift": shift, "depths": _ends(front, back)}

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, warn_external
 from pyvista_vdi.model.checks import as_float
-from pyvista_vdi.model.compositing import opacity
-from pyvista_vdi.model.compositing import optical_depth as optical_depth_of
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH
 
 
@@ -96,12 +94,13 @@ def media(
 
 def _optical_depth(alpha: NDArray[np.float64], channels: dict[str, NDArray[Any]]) -> Any:
     """Return tau where it agrees with A: programs that split or fade samples leave it as it was."""
-    of_alpha = np.where(alpha == 1, OPAQUE_OPTICAL_DEPTH, optical_depth_of(alpha))
+    with np.errstate(divide="ignore"):  # log1p(-1), which is not taken
+        of_alpha = np.where(alpha == 1, OPAQUE_OPTICAL_DEPTH, np.abs(np.log1p(-alpha)))
     tau = channels.get("tau", of_alpha).astype(np.float64)
     tau = np.where((tau >= 0) & (tau < np.inf), tau, 0)
     # float16 opacities would differ by 2**-12 and then say less than tau does, so they count;
     # the second term is the rounding of denormal opacities
-    same = np.abs(opacity(tau) - alpha) <= 2.0**-22 * alpha + 2.0**-148
+    same = np.abs(-np.expm1(-tau) - alpha) <= 2.0**-22 * alpha + 2.0**-148
     return np.where(same, tau, of_alpha)
 
 

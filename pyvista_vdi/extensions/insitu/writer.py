@@ -23,7 +23,7 @@ from pyvista_vdi.extensions.large.on_mpi import (
     together,
 )
 from pyvista_vdi.extensions.series.series import checked_time
-from pyvista_vdi.extensions.series.writer import SeriesWriter, checked_way
+from pyvista_vdi.extensions.series.writer import SeriesWriter
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.model.arguments import names_of, records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
@@ -135,7 +135,6 @@ class InSitu:
             of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
             self._grid = asdict(Grid(points, of.spacing, of.origin, of.direction))
             self._check(options)
-            append, overwrite = checked_way(append, overwrite)
         require_same(
             comm,
             every=self._every,

@@ -16,7 +16,6 @@ from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidArgumentTypeError,
     MissingDependencyError,
-    with_article,
 )
 from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, cuts_of
 from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task
@@ -69,7 +68,7 @@ def generate_in_blocks(
     if not isinstance(client, str | Client):
         raise InvalidArgumentTypeError(
             f"client must be a distributed.Client or the address of a scheduler; got "
-            f"{with_article(type(client).__name__)}: give distributed.Client(cluster) for a cluster"
+            f"{type(client).__name__}: give distributed.Client(cluster) for a cluster"
         )
     try:
         connection = Client(client) if isinstance(client, str) else nullcontext(client)

@@ -8,6 +8,7 @@ was lost with a worker. Which worker did what, and what came first, changes no b
 from __future__ import annotations
 
 import functools
+import os
 import threading
 import uuid
 import weakref
@@ -24,7 +25,6 @@ from pyvista_vdi.extensions.large.blocks import Values
 from pyvista_vdi.extensions.large.passes import Task
 from pyvista_vdi.generation.generate import report
 from pyvista_vdi.model.options import GenerationRequest
-from pyvista_vdi.model.store_identity import Digests, check_digests, digests_of
 
 #: Times that Dask tries again what a lost worker was at.
 _RETRIES = 3
@@ -44,9 +44,9 @@ class Cluster:
         self._token, self._stage = uuid.uuid4().hex[:12], 0
         self._futures: weakref.WeakSet[Future[Any]] = weakref.WeakSet()  # that are still wanted
         self._lazy = array.lazy
-        digests = array.digests() if array.lazy is None else _digests_in(array.lazy)
-        self._sent = None if array.lazy is not None else (dumps(array), digests, self._token)
-        answers = client.run(_able, request.device, digests, on_error="return")
+        files = [str(path) for path in array.files]
+        self._sent = None if array.lazy is not None else (dumps(array), files)
+        answers = client.run(_able, request.device, files, on_error="return")
         if not answers:
             raise NoDeviceError("the cluster has no workers: start some, or wait for them")
         failed = {at: answer for at, answer in answers.items() if not isinstance(answer, str)}
@@ -130,12 +130,12 @@ class Cluster:
             ) from error
 
 
-def _read(pickled: bytes, digests: Digests, run: str, box: tuple[slice, ...]) -> Values:
+def _read(pickled: bytes, files: list[str], box: tuple[slice, ...]) -> Values:
     """Read a part of an array, unpickled here.
 
     Dask waits for ever where arguments cannot be unpickled, as arrays of files that are not there.
     """
-    _check_once(digests, run)
+    _check_files(files)
     try:
         array = loads(pickled)
     except Exception as error:
@@ -147,22 +147,18 @@ def _read(pickled: bytes, digests: Digests, run: str, box: tuple[slice, ...]) ->
     return values
 
 
-@functools.lru_cache(maxsize=64)
-def _check_once(digests: Digests, _run: str) -> None:
-    """Check a worker's files, once for a run: it may have joined after all were asked."""
-    check_digests(digests)
+def _check_files(files: list[str]) -> None:
+    """Raise InvalidVolumeError for a file that is not here: zarr reads what is absent as 0."""
+    for file in files:
+        if not os.path.exists(file):  # noqa: PTH110 - as it was opened
+            raise InvalidVolumeError(
+                f"{file} cannot be read there: every worker needs the whole store by that path"
+            )
 
 
-def _digests_in(lazy: Any) -> Digests:
-    """Return what tells the files of arrays in a Dask graph from others."""
-    layers = getattr(lazy.dask, "layers", {}).values()
-    arrays = [value for layer in layers if len(layer) == 1 for value in layer.values()]
-    return tuple(pair for array in arrays for pair in digests_of(array))
-
-
-def _able(device: Any, digests: Digests) -> str:
-    """Return the name of a worker's device, if it has one and the same files as the client."""
-    check_digests(digests)
+def _able(device: Any, files: list[str]) -> str:
+    """Return the name of a worker's device, if it has one and the volume's files."""
+    _check_files(files)
     return get_runtime(device).info.name
 
 

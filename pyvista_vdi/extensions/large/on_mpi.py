@@ -25,7 +25,6 @@ from pyvista_vdi.errors import (
     InvalidArgumentTypeError,
     MissingDependencyError,
     VDIError,
-    with_article,
 )
 from pyvista_vdi.extensions.large.blocks import Blocks, Ends, Indices
 from pyvista_vdi.extensions.large.generate import ranges_of, vdi_of
@@ -73,7 +72,7 @@ def ranks_of(comm: Any) -> Any:
     with together(MPI.COMM_WORLD, "reading the arguments"):  # where the others most likely are
         raise InvalidArgumentTypeError(
             f"comm must be a communicator of mpi4py, such as MPI.COMM_WORLD; got "
-            f"{with_article(type(comm).__name__)}"
+            f"{type(comm).__name__}"
         )
 
 

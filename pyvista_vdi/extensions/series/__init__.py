@@ -11,7 +11,7 @@ EXTENSION = Extension(
         "generate_series": "pyvista_vdi.extensions.series.generate:generate_series",
     },
     formats=(
-        FileFormat(".vdis", "pyvista_vdi.extensions.series.files", "series", head="series.json"),
+        FileFormat(".vdis", "pyvista_vdi.extensions.series.series", "series", head="series.json"),
     ),
     shown={
         "pyvista_vdi.extensions.series.series:VDISeries": (

@@ -19,7 +19,7 @@ from pyvista_vdi.io.files import format_named, opened
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file import reader, writer
 from pyvista_vdi.io.vdi_file.chunks import CODECS, check_level
-from pyvista_vdi.io.vdi_file.description import from_json, to_json
+from pyvista_vdi.io.vdi_file.layout import from_json, to_json
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.classification import IN_PLACE, Look
@@ -83,17 +83,13 @@ class Archive(Sequence[Any]):
         try:
             stream = opened(self.path)
             weakref.finalize(self, stream.close)
-            begin = stream.read(8)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise VDIFileError(f"{self.path} cannot be read: {reason}") from error
-        if not begin.startswith(b"PK"):
-            kind = f"not a {self._kind.holds} of VDIs, or of an earlier format"
-            raise VDIFileError(f"{self.path} is {kind}: it begins with {begin!r}; make it anew")
         try:
             archive = zipfile.ZipFile(stream)
         except reader.ARCHIVE_ERRORS as error:
-            self.refuse(f"it is truncated, or no whole ZIP ({error})")
+            self.refuse(f"it is truncated, or no {self._kind.holds} of VDIs ({error})")
         # The directory at the end of a file that was cut off is that of a .vdi file within
         if not archive.infolist() or archive.infolist()[0].header_offset:
             self.refuse("it is truncated")

@@ -20,7 +20,6 @@ from pyvista_vdi.cli.inputs import (
     given,
     measuring,
     refuse,
-    refuse_with_values,
 )
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.cli.text import mebibytes, printable
@@ -64,7 +63,6 @@ def series(options: argparse.Namespace) -> int:
     vdis = VDISeries(Called(vdi_of, range(len(steps))), times)
     look = classification(options)
     Classification.composited(look, "series")
-    refuse_with_values(options)
     how = look | given(options, GenerationOptions, Deferral)
     check_writable(with_suffix(Path(options.output), (".vdis",), "a series"))
     with measuring("writing a series") as bar:

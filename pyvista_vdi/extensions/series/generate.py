@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence, Sized
 from itertools import islice
 from typing import Any
@@ -14,8 +13,6 @@ from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidArgumentTypeError,
     naming,
-    warn_external,
-    with_article,
 )
 from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_times
 from pyvista_vdi.io.progress import Pieces
@@ -25,14 +22,12 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget, declared
+from pyvista_vdi.model.options import Deferral, GenerationOptions
 from pyvista_vdi.model.types import CameraLike, ClientLike, DeviceLike, Progress, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.quality.targets import bytes_of
 
-_GRID = ("spacing", "origin")
-_RECORDS = (QualityTarget, Deferral, GenerationOptions)
+_RECORDS = (Deferral, GenerationOptions)
 _OTHERS = names_of(*_RECORDS)
 
 
@@ -42,8 +37,6 @@ def generate_series(
     window_size: WindowSize,
     times: Iterable[float] | None = None,
     *,
-    spacing: Sequence[float] | None = None,
-    origin: Sequence[float] | None = None,
     client: ClientLike | None = None,
     progress: Progress | None = None,
     device: DeviceLike | None = None,
@@ -51,39 +44,34 @@ def generate_series(
 ) -> VDISeries:
     """Generate the VDIs of a volume that changes in time, all from one view.
 
-    The transfer function is made once, of the first step, and so is what a dial chooses: a colour
-    stands for the same value in all steps. Pass ``clim`` where the first step does not have the
+    The transfer function is made once, of the first step: a colour stands for the same value in all
+    steps. Pass ``clim`` where the first step does not have the
     range of the others, or ``value_range`` where ``classification`` is ``"deferred"``.
 
     Parameters
     ----------
-    volumes : iterable or callable or array_like or VTK source
-        The steps: each what :func:`pyvista_vdi.generate` takes, or an array indexed [z, y, x],
-        for which ``spacing`` is given, so that a NumPy or Dask array indexed [step, z, y, x] will
-        do. They are taken one by one. Or a function that returns step i; or a VTK or PyVista
-        source that has time steps; or what :func:`pyvista_vdi.open_volume` returned for a store
-        that has. Of a multi-scale store, steps are of the level that the view requires, unless
-        another was asked for.
+    volumes : iterable or VTK source
+        The steps: each what :func:`pyvista_vdi.generate` takes. They are taken one by one. Or a VTK
+        or PyVista source that has time steps; or what :func:`pyvista_vdi.read_volume` returned for
+        a store that has. Of a multi-scale store, steps are of the level that the view requires,
+        unless another was asked for.
     camera : pyvista.Camera or vtkCamera or Camera
         The generating view V_O.
     window_size : (int, int)
         Width and height in pixels.
     times : iterable of float, optional
-        Of the steps, ascending; those of a source or a store, else 0, 1, 2 … by default. For a
-        function they say how many steps there are.
-    spacing, origin : (float, float, float), optional
-        Of steps that are bare arrays, (x, y, z).
+        Of the steps, ascending; those of a source or a store, else 0, 1, 2 … by default.
     client : distributed.Client, optional
         As for :func:`pyvista_vdi.generate`: of a Dask cluster, whose workers make the VDIs of
-        chunked volumes. Dask arrays are chunked then, and else brought into memory step by step.
+        chunked volumes.
     progress : callable, optional
         Called after each step with the finished fraction, where the number of steps is known; work
         stops if it returns ``False``.
     device : str, int or device, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **options
-        All else that :func:`pyvista_vdi.generate` takes, classification included. ``precision`` is
-        ``"8-byte"`` by default.
+        All else that :func:`pyvista_vdi.generate` takes, classification included, but for quality
+        targets. ``precision`` is ``"8-byte"`` by default.
 
     Returns
     -------
@@ -107,8 +95,8 @@ def generate_series(
     generate : has the options, and the other errors.
     """
     steps, known = _steps(volumes, times)
-    given = {"spacing": spacing, "origin": origin, "client": client, "device": device, **options}
-    make = StepMaker("generate_series", camera, window_size, **given)
+    where = {"client": client, "device": device}
+    make = StepMaker("generate_series", camera, window_size, **where, **options)
     sized: Any = steps if known is None else known
     done = Pieces(progress, len(sized) if isinstance(sized, Sized) else 0)
     vdis: list[VDI] = []
@@ -129,29 +117,21 @@ class StepMaker:
         self, function: str, camera: Any, window_size: Sequence[int], **options: Any
     ) -> None:
         self._camera, self._size = Camera.from_any(camera), check_window_size(window_size)
-        self._pictures = self._size
-        self._grid = {n: v for n in _GRID if (v := options.pop(n, None)) is not None}
         self._where = {name: options.pop(name, None) for name in ("client", "device")}
         looks = {n: v for n, v in options.items() if n not in _OTHERS}
-        self._looks = Classification.composited(looks, function, (*_OTHERS, *_GRID))
+        self._looks = Classification.composited(looks, function, _OTHERS)
         self._described = self._looks.describe()
-        target, deferral, _ = records_of(dict(options), function, *_RECORDS)
+        deferral, _ = records_of(dict(options), function, *_RECORDS)
         if deferral.deferred:
             self._looks.require_no_look()
-            deferral.refuse_target(target)
-        if not target:
-            options.setdefault("precision", "8-byte")
+        options.setdefault("precision", "8-byte")
         self._scalars = options.pop("scalars", None), options.pop("preference", "point")
-        self._options, self._max_bytes = options, target.max_bytes
-        self._dial: dict[str, Any] | None = None  # what the first step chose, where one chooses
+        self._options = options
 
     def __call__(self, volume: Any) -> VDI:
         """Return a step's VDI."""
-        if self._grid and not (hasattr(volume, "GetClassName") or isinstance(volume, Volume)):
-            array = volume if self._where["client"] is not None else np.asarray(volume)
-            volume = Volume(array, **self._grid)
         volume = as_volume(volume, *self._scalars)
-        volume = volume.in_view(self._camera, window_size=self._pictures)
+        volume = volume.in_view(self._camera, window_size=self._size)
         if not (self._looks.in_place or self._options.get("classification") == "deferred"):
             # A colour stands for the same value in all steps
             table = self._looks.transfer_function_of(volume)
@@ -162,20 +142,6 @@ class StepMaker:
         vdi.metadata["classification"] = self._described  # as the first step's was asked for
         if isinstance(vdi, DeferredVDI):
             self._options["value_range"] = vdi.value_range
-        elif self._dial is not None:
-            vdi.metadata["dial"] = self._dial
-            if self._max_bytes is not None and bytes_of(vdi) > self._max_bytes:
-                warn_external(
-                    f"max_bytes={self._max_bytes} is not kept by all steps: one has "
-                    f"{bytes_of(vdi)} on the device; begin with a step that has as much to show"
-                )
-                self._max_bytes = None  # it is said once
-        elif dial := vdi.metadata.get("dial"):
-            # What was chosen for the first step are the settings of all others
-            self._dial, self._size = {**dial, "missed": []}, vdi.window_size
-            dropped = declared(QualityTarget)
-            self._options = {n: v for n, v in self._options.items() if n not in dropped}
-            self._options |= {n: dial["chosen"][n] for n in ("max_supersegments", "precision")}
         return vdi  # type: ignore[no-any-return]
 
 
@@ -193,20 +159,10 @@ def _steps(
         volumes = Called(volumes.at_time, range(len(volumes.store.times)))
     times = own if times is None else times
     known = None if times is None else checked_times(times)
-    if callable(volumes):
-        if known is None:
-            raise InvalidArgumentError(
-                "volumes is a function of the step's index: pass times, one for each step"
-            )
-        volumes = Called(volumes, range(len(known)))
-    elif (
-        isinstance(volumes, Volume | str | bytes | os.PathLike)
-        or hasattr(volumes, "GetClassName")
-        or not np.iterable(volumes)
-    ):
+    single = isinstance(volumes, Volume | str | bytes) or hasattr(volumes, "GetClassName")
+    if single or not np.iterable(volumes):
         raise InvalidArgumentTypeError(
-            f"volumes must be an iterable of volumes, or a function; got "
-            f"{with_article(type(volumes).__name__)}: pass a list of them, or call generate"
+            f"volumes must be volumes, one for each step; got {type(volumes).__name__}: pass a list"
         )
     if known is not None and isinstance(volumes, Sized) and len(volumes) != len(known):
         raise InvalidArgumentError(f"there are {len(volumes)} steps and {len(known)} times")

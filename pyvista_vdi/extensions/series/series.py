@@ -1,8 +1,9 @@
-"""The series of VDIs: one for each time step."""
+"""The series of VDIs, one for each time step; and its files, ``.vdis`` and pages."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -10,9 +11,17 @@ from typing import Any, overload
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    InvalidVDIError,
+    VDIFileError,
+)
 from pyvista_vdi.extensions.series.archive import SERIES, Archive
+from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, each_of
@@ -117,12 +126,32 @@ class VDISeries(VDICollection):
 
     def __repr__(self) -> str:
         width, height = self.window_size
-        ends = self.value_range
-        kept = "" if ends is None else f", values from {ends[0]:g} to {ends[1]:g}"
         return (
             f"VDISeries({len(self)} steps, times {self.times[0]:g} to {self.times[-1]:g}, "
-            f"{width} x {height} lists{kept})"
+            f"{width} x {height} lists)"
         )
+
+
+def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISeries:
+    """Read a series; its steps are read when they are asked for."""
+    steps = Archive(path, SERIES)
+    if not len(steps):
+        raise VDIFileError(f"{path} has no finished step: none has been written yet")
+    Pieces(progress, 1)()
+    return VDISeries(steps, times_of(steps))
+
+
+def times_of(steps: Archive) -> tuple[float, ...]:
+    """Return the times of a stored series."""
+    try:
+        return checked_times(steps.about["times"])
+    except InvalidArgumentError as error:
+        steps.refuse(f"its times cannot be ({error})")
+
+
+def read_info(path: str | os.PathLike[str]) -> FileInfo:
+    """Read what a series says about itself, without its arrays: errors as for :func:`read`."""
+    return Archive(path, SERIES).info()
 
 
 class Called(Sequence[Any]):
@@ -187,10 +216,6 @@ def checked_times(times: Iterable[float]) -> tuple[float, ...]:
 
 def checked_time(time: Any) -> float:
     """Return a time as a float, or raise InvalidArgumentError where it is no finite number."""
-    try:
-        value = float(np.asarray(time).reshape(()))
-    except (TypeError, ValueError, OverflowError):
-        value = math.nan
-    if not math.isfinite(value):
+    if not math.isfinite(value := as_float(time)):
         raise InvalidArgumentError(f"a time must be a finite number; got {time!r}")
     return value

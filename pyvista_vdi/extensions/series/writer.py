@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import json
 import os
@@ -12,19 +13,17 @@ from typing import IO, Any
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, naming, warn_external
 from pyvista_vdi.extensions.series.archive import SERIES, Archive, head_bytes, name_of
-from pyvista_vdi.extensions.series.files import times_of
 from pyvista_vdi.extensions.series.generate import StepMaker
-from pyvista_vdi.extensions.series.series import check_range, checked_time
+from pyvista_vdi.extensions.series.series import check_range, checked_time, times_of
 from pyvista_vdi.io import check_write_options
-from pyvista_vdi.io.vdi_file.description import to_json
-from pyvista_vdi.model.checks import as_flag
+from pyvista_vdi.io.vdi_file.layout import to_json
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, whole_file, with_suffix
 
 
-class SeriesWriter:
+class SeriesWriter(contextlib.AbstractContextManager["SeriesWriter"]):
     """Writes a series while what it shows is still being computed.
 
     It is a folder of numbered ``.vdi`` files, and ``series.json``, which has their times. Each step
@@ -99,13 +98,7 @@ class SeriesWriter:
             self._make = StepMaker("SeriesWriter", camera, window_size, **given)
         self._how = {"precision": precision, "compression": compression, "level": level}
         check_write_options(name_of(0), self._how)
-        append, overwrite = checked_way(append, overwrite)
         self.path = Path(os.path.realpath(with_suffix(as_path(path), (SERIES.suffix,), "a series")))
-        if self.path.is_file():
-            raise VDIFileError(
-                f"{self.path} is one file, and a series is written step by step into a folder: "
-                "choose another name, or move the file away"
-            )
         self._times: list[float] = []
         self._range: tuple[float, float] | None = None  # of the values that steps keep
         self._before: Any = None  # the last step of an earlier run, to compare the next one with
@@ -205,9 +198,6 @@ class SeriesWriter:
         if lock is not None:
             lock.close()
 
-    def __enter__(self) -> SeriesWriter:
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
@@ -244,16 +234,6 @@ def _locked(folder: Path) -> IO[bytes]:
             "second writer from it, whose steps would replace these"
         )
     return stream
-
-
-def checked_way(append: Any, overwrite: Any) -> tuple[bool, bool]:
-    """Return both as truth values, or raise InvalidArgumentError if both are asked for."""
-    append, overwrite = as_flag(append, "append"), as_flag(overwrite, "overwrite")
-    if append and overwrite:
-        raise InvalidArgumentError(
-            "append=True continues a series and overwrite=True replaces it: pass one of them"
-        )
-    return append, overwrite
 
 
 def _view_and_look(vdi: Any) -> dict[str, Any]:

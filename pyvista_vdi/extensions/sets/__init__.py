@@ -9,7 +9,7 @@ EXTENSION = Extension(
         "VDISet": "pyvista_vdi.extensions.sets.vdi_set:VDISet",
         "generate_set": "pyvista_vdi.extensions.sets.generate:generate_set",
     },
-    formats=(FileFormat(".vdiset", "pyvista_vdi.extensions.sets.files", "set", head="set.json"),),
+    formats=(FileFormat(".vdiset", "pyvista_vdi.extensions.sets.vdi_set", "set", head="set.json"),),
     shown={
         "pyvista_vdi.extensions.sets.vdi_set:VDISet": "pyvista_vdi.extensions.sets.shown:SetInput"
     },

@@ -127,8 +127,7 @@ def generate_set(
     vdis = []
     for view in cameras:
         # All of the volume has lists, of the density that was asked for
-        covering = covering_view(view, edges, bounds_corners(read.bounds))
-        seen, shape = covering or (view, edges)
+        seen, shape = covering_view(view, edges, bounds_corners(read.bounds)) or (view, edges)
         request = GenerationRequest(read, table, seen, shape, made, device, metadata=about)
         vdis.append(generate_vdi(request))
         done()

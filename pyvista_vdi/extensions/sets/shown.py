@@ -2,44 +2,31 @@
 
 from __future__ import annotations
 
-import threading
 from typing import Any
 
-from pyvista_vdi.device import Runtime
-from pyvista_vdi.errors import Cancelled
-from pyvista_vdi.extensions.series.shown import MEMORY, ON_DEVICE, Decoding, bring
+from pyvista_vdi.extensions.series.shown import ON_DEVICE, SeveralInput
 from pyvista_vdi.extensions.sets.vdi_set import MOST_BLENDED, VDISet
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.background import BackgroundThread
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 
-#: How many of the VDIs nearest to a view are read.
-_AHEAD = 8
 
-
-class SetInput(Input):
+class SetInput(SeveralInput):
     """The VDI of a set that is nearest to the view, or a blend of several.
 
-    :meth:`look` is told where the thread that draws looks from. Another thread reads what is
-    nearest to the view, and brings it to the device, as far as there is memory.
+    :meth:`look` is told where the thread that draws looks from; what is nearest is read.
     """
 
     collection: VDISet
     remedy = "generate a set with more views, or with views of this kind"
+    ahead = 8
 
     def __init__(self, vdi_set: VDISet) -> None:
-        super().__init__()
-        self.collection = vdi_set
-        self.memory: float = MEMORY
+        super().__init__(vdi_set, "pyvista-vdi set")
         self._weights = vdi_set.weights(vdi_set.cameras[0])
         self._order = [i for i, _ in self._weights]  # all VDIs, the nearest first
-        self._lock = threading.Lock()
-        self._ready: dict[int, VDI] = {}
-        self._broken: set[int] = set()
-        self._decoder = BackgroundThread("pyvista-vdi set")
         self._kept: dict[int, DeferredInput] = {}  # of what is drawn, where it keeps values
 
     def vdi(self) -> VDI | None:
@@ -52,12 +39,6 @@ class SetInput(Input):
         """The nearest VDI's values, where it keeps them."""
         nearest: Any = self._at(self._weights[0][0])
         return nearest if isinstance(nearest, DeferredVDI) else None
-
-    def classified_by(self, prop: Any) -> Input:
-        """Set the property that classifies the values of all VDIs from now on."""
-        self.prop = prop
-        self._kept.clear()
-        return self
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds that all VDIs have."""
@@ -74,16 +55,8 @@ class SetInput(Input):
         return other
 
     def on_devices(self) -> list[Any]:
-        """Return the VDIs that are decoded, and what was classified of those that are drawn."""
-        with self._lock:
-            return [self._vdi, *self._ready.values(), *(one.last() for one in self._kept.values())]
-
-    def rest(self) -> None:
-        """Leave no thread; the next frame may begin anew."""
-        self._decoder.clear()
-        self._decoder.join()
-        with self._lock:
-            self._ready.clear()
+        """Return the VDIs that are ready, and what was classified of those that are drawn."""
+        return [*super().on_devices(), *(one.last() for one in self._kept.values())]
 
     def look(self, camera: Camera, device: Any) -> None:
         """Choose what a view shows, and read what is near it."""
@@ -91,8 +64,7 @@ class SetInput(Input):
         with self._lock:
             self._weights = self.collection.weights(camera)
             self._order = [int(i) for i in distances.argsort(kind="stable")]
-        if not self._decoder.running and self._wanted() is not None:
-            self._decoder.put(Decoding(lambda on, _report: self._decode(on), device))
+        self._read_ahead(device)
 
     def parts(self) -> list[tuple[VDI, float]]:
         """Return what a picture is blended of, with weights; the nearest first."""
@@ -104,48 +76,22 @@ class SetInput(Input):
         if not isinstance(vdi, DeferredVDI) or self.prop is None:
             return as_vdi(vdi)  # refuses what has no colours
         kept = self._kept.get(i)
-        if kept is None or kept.deferred is not vdi:
+        if kept is None or (kept.deferred, kept.prop) != (vdi, self.prop):
             drawn = dict(self._weights)
             self._kept = {k: one for k, one in self._kept.items() if k in drawn}
             kept = self._kept[i] = DeferredInput(vdi, self.prop)
         return as_vdi(kept.vdi())
 
-    def _at(self, i: int) -> VDI:
-        with self._lock:
-            known = self._ready.get(i)
-        if known is None:
-            known = self.collection[i]
-            self._keep(i, known)
-        return known
-
     def _fitting(self) -> list[int]:
         """Return the nearest VDIs that there is memory for, and at least those that are drawn."""
         largest = max((1.0, *(v.nbytes * (1 + ON_DEVICE) for v in self._ready.values())))
-        return self._order[: max(MOST_BLENDED, min(_AHEAD, int(self.memory / largest)))]
+        return self._order[: max(MOST_BLENDED, min(self.ahead, int(self.memory / largest)))]
 
     def _wanted(self) -> int | None:
-        """Return the next VDI to be read; None where enough are."""
         with self._lock:
             known = self._ready.keys() | self._broken
             return next((i for i in self._fitting() if i not in known), None)
 
-    def _decode(self, runtime: Runtime) -> bool:
-        while (i := self._wanted()) is not None and self._decoder.running:
-            try:
-                vdi = self.collection[i]
-                bring(runtime, vdi)
-            except Cancelled:
-                raise
-            except Exception:  # a frame that needs it says what is wrong
-                with self._lock:
-                    self._broken.add(i)
-                continue
-            self._keep(i, vdi)
-        return True
-
-    def _keep(self, i: int, vdi: VDI) -> None:
-        """Keep a VDI that was read, and drop those that are far."""
-        with self._lock:
-            self._ready[i] = vdi
-            near = self._fitting()
-            self._ready = {k: kept for k, kept in self._ready.items() if k in near or k == i}
+    def _trim(self) -> None:
+        near = self._fitting()
+        self._ready = {k: vdi for k, vdi in self._ready.items() if k in near}

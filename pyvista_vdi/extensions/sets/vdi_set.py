@@ -1,17 +1,26 @@
-"""The set of VDIs: one for each of many sides."""
+"""The set of VDIs, one for each of many sides; and its files, ``.vdiset`` and pages."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, InvalidVDIError
+from pyvista_vdi.errors import (
+    InvalidArgumentError,
+    InvalidArgumentTypeError,
+    InvalidVDIError,
+    VDIError,
+)
+from pyvista_vdi.extensions.series.archive import Archive
 from pyvista_vdi.extensions.series.series import Called, as_steps
 from pyvista_vdi.extensions.sets import EXTENSION
+from pyvista_vdi.io.progress import Pieces, Progress
+from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_floats
 from pyvista_vdi.model.collection import VDICollection
@@ -64,6 +73,10 @@ class VDISet(VDICollection):
         As above.
     bounds : tuple of float
         As above.
+    blend : float
+        Degrees by which a V_O may be farther than the nearest and still be blended in, 6 by
+        default: the farther, the less it counts, so that nothing jumps when another one becomes
+        the nearest. 0 shows the nearest alone.
     """
 
     kind = EXTENSION.formats[0]
@@ -103,7 +116,7 @@ class VDISet(VDICollection):
                 )
         self._begin = self._cameras[0] if camera is None else Camera.from_any(camera)
         self._places = self._places_of(self._cameras)
-        self._blend = BLEND
+        self.blend = BLEND
 
     @property
     def about(self) -> dict[str, Any]:
@@ -142,22 +155,6 @@ class VDISet(VDICollection):
             return [self[i] for i in range(len(self))[index]]
         return self._views[self._place(index, "VDIs")]  # type: ignore[no-any-return]
 
-    @property
-    def blend(self) -> float:
-        """Degrees by which a V_O may be farther than the nearest and still be blended in.
-
-        The farther, the less it counts, so that nothing jumps when another one becomes the
-        nearest. 0 shows the nearest alone.
-        """
-        return self._blend
-
-    @blend.setter
-    def blend(self, degrees: float) -> None:
-        value = as_float(degrees)
-        if not 0 <= value <= 180:
-            raise InvalidArgumentError(f"blend must be degrees, 0 to 180; got {degrees!r}")
-        self._blend = value
-
     def _mapped(self, function: Callable[[VDI], VDI]) -> VDISet:
         found = VDISet(
             Called(function, self, kept=8),
@@ -181,7 +178,10 @@ class VDISet(VDICollection):
         camera : Camera or vtkCamera or pyvista.Camera
             The view; its model transform places the set.
         """
-        return _apart(self._places, self._places_of([Camera.from_any(camera)]))
+        [here], places = self._places_of([Camera.from_any(camera)]), self._places
+        cross = np.linalg.norm(np.cross(places[:, :3], here[:3]), axis=1)
+        angle = np.arctan2(cross, places[:, :3] @ here[:3])
+        return np.asarray(np.degrees(np.hypot(angle, places[:, 3] - here[3])))
 
     def nearest(self, camera: Any) -> int:
         """Return the index of the VDI whose V_O is nearest to a view; of two, the earlier.
@@ -204,11 +204,13 @@ class VDISet(VDICollection):
         camera : Camera or vtkCamera or pyvista.Camera
             The view.
         """
+        if not 0 <= (blend := as_float(self.blend)) <= 180:
+            raise InvalidArgumentError(f"blend must be degrees, 0 to 180; got {self.blend!r}")
         distances = self.distances(camera)
         order = np.argsort(distances, kind="stable")[: MOST_BLENDED + 1]
         beyond = distances[order] - distances[order[0]]
         # Continuous where another one comes in for the last, too
-        reach = min(self._blend, beyond[-1]) if len(order) > MOST_BLENDED else self._blend
+        reach = min(blend, beyond[-1]) if len(order) > MOST_BLENDED else blend
         shares = np.maximum(0.0, 1.0 - beyond[1:] / reach) if reach > 0 else np.zeros(0)
         shares = np.append(1.0, shares[shares > 0])
         return [(int(i), float(w)) for i, w in zip(order, shares / shares.sum(), strict=False)]
@@ -225,9 +227,7 @@ class VDISet(VDICollection):
 
     def __repr__(self) -> str:
         width, height = self.window_size
-        ends = self.value_range
-        kept = "" if ends is None else f", values from {ends[0]:g} to {ends[1]:g}"
-        return f"VDISet({len(self)} VDIs, for pictures of {width} x {height}{kept})"
+        return f"VDISet({len(self)} VDIs, for pictures of {width} x {height})"
 
     def _places_of(self, cameras: Sequence[Camera]) -> NDArray[np.float64]:
         """Return the direction of each eye from the centre, and the logarithm of its distance.
@@ -246,7 +246,23 @@ class VDISet(VDICollection):
         return np.column_stack([towards, np.log(away)])
 
 
-def _apart(places: NDArray[np.float64], here: NDArray[np.float64]) -> NDArray[np.float64]:
-    cross = np.linalg.norm(np.cross(places[:, :3], here[:, :3]), axis=1)
-    angle = np.arctan2(cross, places[:, :3] @ here[0, :3])
-    return np.asarray(np.degrees(np.hypot(angle, places[:, 3] - here[0, 3])))
+def read(path: str | os.PathLike[str], *, progress: Progress | None = None) -> VDISet:
+    """Read a set; its VDIs are read when they are asked for."""
+    vdis = Archive(path, VDISet.kind)
+    try:
+        vdi_set = VDISet(
+            vdis,
+            [Camera.from_dict(view) for view in vdis.about["views"]],
+            camera=Camera.from_dict(vdis.about["camera"]),
+            window_size=vdis.about["picture_size"],
+            bounds=vdis.about["bounds"],
+        )
+    except (VDIError, KeyError, TypeError, ValueError) as error:
+        vdis.refuse(f"its {VDISet.kind.head} is incomplete or wrong ({error!r})")
+    Pieces(progress, 1)()
+    return vdi_set
+
+
+def read_info(path: str | os.PathLike[str]) -> FileInfo:
+    """Read what a set says about itself, without its arrays: errors as for :func:`read`."""
+    return Archive(path, VDISet.kind).info()

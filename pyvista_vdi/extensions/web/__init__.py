@@ -27,7 +27,7 @@ EXTENSION = Extension(
         FileFormat(
             ".html",
             "pyvista_vdi.extensions.web.page",
-            write_options=("precision", "title", "background", "controls", *_LOOK),
+            write_options=("precision", "title", "background", *_LOOK),
             compressions=("deflate",),
             page=True,
             values=True,
@@ -43,7 +43,6 @@ EXTENSION = Extension(
         ),
     ),
     methods={
-        "VDI._repr_html_": "pyvista_vdi.extensions.web.notebook:html_of",
         "VDI._repr_mimebundle_": "pyvista_vdi.extensions.web.notebook:mime_bundle",
         "VDISeries._repr_mimebundle_": "pyvista_vdi.extensions.web.notebook:mime_bundle",
         "VDISet._repr_mimebundle_": "pyvista_vdi.extensions.web.notebook:mime_bundle",

@@ -27,7 +27,7 @@ SPAWN = "spawn.js"
 
 #: What takes the place of SPAWN.
 _SPAWN_BUNDLED = """\
-export const waysToSpawn = [() => {
+export const spawn = () => {
   const text = `"use strict";(${workerPart})();`;
   const url = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
   try {
@@ -35,7 +35,7 @@ export const waysToSpawn = [() => {
   } finally {
     URL.revokeObjectURL(url);
   }
-}];
+};
 """
 
 _IMPORT = re.compile(r'^import \{[^}]*\} from "\./([\w.]+)";\n', re.MULTILINE)

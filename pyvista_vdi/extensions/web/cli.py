@@ -4,42 +4,32 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
 from typing import Any
 
 from pyvista_vdi.cli.inputs import classification, given, read_volume
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.errors import naming
+from pyvista_vdi.extensions.series.series import Called
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.model.volume import Volume
-
-
-class _Steps(Sequence[Volume]):
-    """The volumes that the options name, read when they are asked for."""
-
-    def __init__(self, options: argparse.Namespace) -> None:
-        if options.files:
-            self._steps = steps_of_volumes(in_order(options.files), options)
-        else:
-            self._steps = [Step(options.example, None, lambda: read_volume(options))]
-
-    def __len__(self) -> int:
-        return len(self._steps)
-
-    def __getitem__(self, step: Any) -> Any:
-        with naming(self._steps[step].name):
-            return self._steps[step].read()
 
 
 def serve(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     from pyvista_vdi.extensions.web.server import serve as serve_volumes  # needs aiohttp
 
+    steps = [Step(options.example, None, lambda: read_volume(options))]
+    if options.files:
+        steps = steps_of_volumes(in_order(options.files), options)
+
+    def volume_of(step: Step) -> Any:
+        with naming(step.name):
+            return step.read()
+
     arguments = classification(options)
     Classification.composited(arguments, "serve")  # refused before the volume is read
     serve_volumes(
-        _Steps(options),
+        Called(volume_of, steps),  # read when somebody wants to see it
         host=options.host,
         port=options.port,
         token=options.token,
@@ -47,7 +37,6 @@ def serve(options: argparse.Namespace) -> int:
         lists=math.prod(options.lists),
         **given(options, GenerationOptions, flat=True),
         device=options.device,
-        announce=lambda line: print(line, flush=True),
         **arguments,
     )
     print("The server has ended")

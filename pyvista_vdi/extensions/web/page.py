@@ -8,7 +8,7 @@ import html
 import io
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -24,8 +24,6 @@ from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.layout import DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.model.checks import one_of
-from pyvista_vdi.model.compositing import opacity, transmittance
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.metrics import check_background, over_background
 from pyvista_vdi.model.vdi import VDI
@@ -35,9 +33,6 @@ from pyvista_vdi.model.whole_file import check_writable, whole_file
 DATA_TYPE = "application/vdi+base64"
 #: The same, of what is beside the VDI: see web/scene.py.
 _SCENE_TYPE = "application/vdi-scene+base64"
-
-#: The bar of buttons: there, or not.
-CONTROLS = ("all", "none")
 
 #: Longest edge of the still picture, pixels, and the quality of its JPEG.
 _STILL_EDGE, _STILL_QUALITY = 480, 75
@@ -84,7 +79,7 @@ h1 {{ position: absolute; width: 1px; height: 1px; margin: 0; overflow: hidden; 
 """
 
 _VIEW = """\
-<vdi-viewer background="{background}"{attributes}>
+<vdi-viewer background="{background}" fit="{fit}" hash=""{autoplay}>
 <img alt="{title}" src="data:image/jpeg;base64,{still}">
 {parts}</vdi-viewer>
 """
@@ -100,7 +95,6 @@ def page(
     *,
     title: str = "VDI",
     background: Sequence[float] = (0.0, 0.0, 0.0),
-    controls: str = "all",
     precision: str | None = None,
     level: int | None = None,
     autoplay: bool = False,
@@ -110,12 +104,10 @@ def page(
     """Return an HTML page that shows a VDI, as large as the window, behind it an RGB from 0 to 1.
 
     Or one that plays a series, with ``autoplay`` as soon as it is opened, or shows a set.
-    ``precision`` is "8-byte" by default, and ``level`` (of deflate) 6. ``controls="none"`` leaves
-    out the bar of buttons. A page of a :class:`DeferredVDI` holds its values, and its transfer
-    function is edited there; ``look``: what that begins with, the arguments of
-    :meth:`DeferredVDI.classified`.
+    ``precision`` is "8-byte" by default, and ``level`` (of deflate) 6. A page of a
+    :class:`DeferredVDI` holds its values, and its transfer function is edited there; ``look``: what
+    that begins with, the arguments of :meth:`DeferredVDI.classified`.
     """
-    one_of(controls, "controls", CONTROLS)
     shown = as_shown(shown)
     seen = seen_of(shown, **look)
     percents = " ".join(f"{100 * channel:g}%" for channel in check_background(background))
@@ -124,55 +116,41 @@ def page(
     size = seen.window_size if "screen" in seen.metadata else seen.picture_size
     size = shown.window_size if isinstance(shown, VDISet) else size
     color = f"rgb({percents})"
-    element = viewer(
-        file_of(shown, precision or "8-byte", level, seen=seen, progress=progress),
-        still.astype(np.uint8),
-        size,
-        title=title,
-        background=color,
-        attributes={"autoplay": ""} if autoplay else {},
-        controls=controls,
-    )
-    return html_page(title, element, color, POLICY).encode()
+    file = file_of(shown, precision or "8-byte", level, seen=seen, progress=progress)
+    how = {"title": title, "background": color, "autoplay": autoplay}
+    return page_of(file, still.astype(np.uint8), size, **how).encode()  # type: ignore[arg-type]
 
 
-def viewer(
+def page_of(
     file: tuple[bytes, int] | None,
     still: NDArray[np.uint8],
     size: Sequence[int],
     *,
     title: str,
     background: str,
-    attributes: Mapping[str, str],
-    controls: str,
+    autoplay: bool = False,
     scene: bytes | None = None,
-    number: int = 0,
 ) -> str:
-    """Return a viewer in a page, with what it shows.
+    """Return a page with a viewer and what it shows.
 
     ``file``: of :func:`file_of`; ``None`` if all is in the ``scene``, see web/scene.py. ``still``:
     uint8 (H, W, 3), the picture where nothing can be turned; it is shown as ``size``, or smaller.
-    ``background``: as CSS has it. ``number``: of several in a page, the first of which has the
-    script, and what is seen in its address; :func:`read` gives its VDI back.
+    ``background``: as CSS has it.
     """
-    said = {"fit": "{}/{}".format(*size), **attributes}
-    said |= {} if controls == "all" else {"controls": controls}
-    before, script, of = "", "", f' data-of="{number}"'
-    if number == 0:
-        said["hash"] = ""
-        text = viewer_script(*["scene.js"] * (scene is not None))
-        before, script, of = _NO_SCRIPT, f"<script>\n{text}</script>\n", ""
+    text = viewer_script(*["scene.js"] * (scene is not None))
     parts = [] if file is None else in_parts(*file)
-    texts = [f'<script type="{DATA_TYPE}"{of}>{_text(part)}</script>\n' for part in parts]
-    if scene is not None:
-        script = f'<script type="{_SCENE_TYPE}">{_text(scene)}</script>\n{script}'
-    return _VIEW.format(
+    data = [f'<script type="{DATA_TYPE}">{_text(part)}</script>\n' for part in parts]
+    beside = "" if scene is None else f'<script type="{_SCENE_TYPE}">{_text(scene)}</script>\n'
+    script = f"{beside}<script>\n{text}</script>\n"
+    element = _VIEW.format(
         title=html.escape(title),
         background=background,
-        attributes="".join(f' {name}="{html.escape(value)}"' for name, value in said.items()),
+        fit="{}/{}".format(*size),
+        autoplay=" autoplay" if autoplay else "",
         still=_text(_jpeg(still, size)),
-        parts="".join([before, *texts[:1], script, *texts[1:]]),
+        parts="".join([_NO_SCRIPT, *data[:1], script, *data[1:]]),
     )
+    return html_page(title, element, background, POLICY)
 
 
 def html_page(title: str, body: str, background: str, policy: str, style: str = "") -> str:
@@ -286,7 +264,7 @@ def _from_generating_view(vdi: VDI) -> NDArray[np.float64]:
     tau = np.minimum(vdi.optical_depth, 100.0).astype(np.float64)
     sums = np.concatenate([[0.0], np.cumsum(tau)])
     before = sums[:-1] - np.repeat(sums[vdi.offsets.view(np.int64)[:-1]], counts)
-    share = transmittance(np.maximum(before, 0.0)) * opacity(tau)
+    share = np.exp(-np.maximum(before, 0.0)) * -np.expm1(-tau)
     own = np.repeat(np.arange(len(counts)), counts)
     channels = [*(share * vdi.color.T.astype(np.float64)), share]
     picture = np.empty((*vdi.window_size[::-1], 4))

@@ -21,11 +21,16 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from pyvista_vdi.errors import warn_external
-from pyvista_vdi.extensions.web.camera import MOST_PLANES, viewer_camera
-from pyvista_vdi.extensions.web.page import CONTROLS, POLICY, html_page, viewer
-from pyvista_vdi.extensions.web.shown import Shown, bare_file, file_of, png
-from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.errors import InvalidArgumentError, warn_external
+from pyvista_vdi.extensions.web.page import page_of
+from pyvista_vdi.extensions.web.shown import (
+    MOST_PLANES,
+    Shown,
+    bare_file,
+    file_of,
+    png,
+    viewer_camera,
+)
 from pyvista_vdi.model.whole_file import whole_file
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
@@ -36,7 +41,7 @@ _FIXED = ("vtkTextActor", "vtkCornerAnnotation", "vtkScalarBarActor", "vtkLegend
 
 
 @dataclass
-class Scene:
+class ShownScene:
     """What is shown of a renderer."""
 
     shown: Shown | None  # by the viewer itself: the first actor's VDI, series or set
@@ -44,7 +49,6 @@ class Scene:
     planes: list[list[float]]  # that it is clipped to
     data: bytes  # all the rest, for scene.js: deflated JSON, in which arrays are base64
     background: str  # as CSS has it
-    left_out: list[str]  # what is not shown, by name
 
 
 def is_vdi(prop: Any) -> bool:
@@ -52,25 +56,14 @@ def is_vdi(prop: Any) -> bool:
     return isinstance(prop, VDIActorMethods)
 
 
-def scenes_of(plotter: Any, where: str, *, follow: bool = False) -> list[Scene]:
-    """Return what each renderer of a plotter that has been drawn shows; warn of what is left out.
+def scene_of(plotter: Any, where: str | None, *, follow: bool = False) -> ShownScene:
+    """Return what a plotter that has been drawn shows, for the viewer; warn of what is left out.
 
-    ``where``: what the warning calls it. ``follow``: as for :func:`scene_of`.
+    ``where``: what the warning calls it; ``None``: it has been said. ``follow``: the viewer takes
+    the plotter's view, and its VDIs as they are; otherwise it begins with that view, of which VDIs
+    are made where their volumes are at hand.
     """
-    scenes = [scene_of(renderer, follow=follow) for renderer in plotter.renderers]
-    left_out = dict.fromkeys(what for scene in scenes for what in scene.left_out)
-    if left_out:
-        more = ': see all by jupyter_backend="server"' if follow else ""
-        warn_external(f"{where} shows the scene without {', '.join(left_out)}{more}")
-    return scenes
-
-
-def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
-    """Return what a renderer that has been drawn shows, for the viewer.
-
-    ``follow``: the viewer takes the renderer's view, and its VDIs as they are; otherwise it begins
-    with that view, of which VDIs are made where their volumes are at hand.
-    """
+    renderer = plotter.renderer
     names = {prop: name for name, prop in getattr(renderer, "actors", {}).items()}
     left_out = _effects(renderer)
     meshes: list[dict[str, Any]] = []
@@ -90,9 +83,9 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
             vdi = prop.vdi if follow else prop.GetMapper().driver.vdi_of_view(renderer, matrix)
             if vdi is None:
                 continue
-            where = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
+            placed: dict[str, Any] = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
             file = None if actor is None else bare_file(vdi)
-            vdis.append({**where, "opacity": prop.opacity_multiplier, "file": file})
+            vdis.append({**placed, "opacity": prop.opacity_multiplier, "file": file})
             boxes.append(np.reshape(prop.GetBounds(), (3, 2)).T)
             if actor is None:
                 actor, shown = prop, vdi if several is None else several
@@ -120,7 +113,11 @@ def scene_of(renderer: Any, *, follow: bool = False) -> Scene:
     head["pictures"] = [_picture(renderer, flat, []), _picture(renderer, bound, _axes(renderer))]
     text = json.dumps(head, default=lambda numbers: b64encode(numbers).decode())
     data, planes = zlib.compress(text.encode(), 6), vdis[0]["planes"] if vdis else []
-    return Scene(shown, actor, planes, data, _background(renderer), left_out)
+    if left_out and where is not None:
+        more = ': see all by jupyter_backend="server"' if follow else ""
+        named = ", ".join(dict.fromkeys(left_out))
+        warn_external(f"{where} shows the scene without {named}{more}")
+    return ShownScene(shown, actor, planes, data, _background(renderer))
 
 
 def state_of(renderer: Any) -> Any:
@@ -289,14 +286,17 @@ def _background(renderer: Any) -> str:
     return f"linear-gradient(to top, {low}, {high})" if renderer.GetGradientBackground() else low
 
 
-def export_html(
-    plotter: Any, filename: str | os.PathLike[str] | None, *, controls: str = "all"
-) -> io.StringIO | None:
+def export_html(plotter: Any, filename: str | os.PathLike[str] | None) -> io.StringIO | None:
     """Write a page of a plotter's scene: see ``plotting.component.PlotterVDIs.export_html``.
 
-    All of its renderers are shown; it is drawn, and VDIs that are missing are made.
+    It is drawn, and VDIs that are missing are made.
     """
-    one_of(controls, "controls", CONTROLS)
+    renderer, *others = plotter.renderers
+    if others:
+        raise InvalidArgumentError(
+            f"a page shows one renderer, and this plotter has {1 + len(others)}: export plotters "
+            "of one, and put their pages beside each other"
+        )
 
     # Draw it, off-screen where it has not been shown
     window = plotter.render_window
@@ -309,42 +309,18 @@ def export_html(
     finally:
         window.SetOffScreenRendering(off_screen)
 
-    # Put a viewer where each renderer is in the window; linked ones turn together
     target = None if filename is None else Path(filename).with_suffix(".html")
-    title = plotter.title if target is None else target.stem
-    # Which cameras they are, not how they look: PyVista's that are alike are equal
-    cameras = [r.GetActiveCamera().GetAddressAsString("") for r in plotter.renderers]
-    shown = list(zip(plotter.renderers, scenes_of(plotter, "the page"), cameras, strict=True))
-    shown.sort(key=lambda each: each[1].shown is None)  # the first can be read again
-    body = ""
-    for number, (renderer, scene, camera) in enumerate(shown):
-        attributes = {}
-        if len(shown) > 1:
-            left, bottom, right, top = renderer.GetViewport()
-            place = f"position: absolute; left: {left:%}; bottom: {bottom:%}"
-            size = f"width: {right - left:%}; height: {top - bottom:%}"
-            attributes = {"style": f"{place}; {size}", "data-link": str(cameras.index(camera))}
-        body += viewer(
-            None if scene.shown is None else file_of(scene.shown),
-            part_of(picture, renderer),
-            renderer.GetSize(),
-            title=title,
-            background=scene.background,
-            attributes=attributes,
-            controls=controls,
-            scene=scene.data,
-            number=number,
-        )
-    page = html_page(title, body, shown[0][1].background, POLICY)
+    scene = scene_of(plotter, "the page")
+    page = page_of(
+        None if scene.shown is None else file_of(scene.shown),
+        picture,
+        renderer.GetSize(),
+        title=plotter.title if target is None else target.stem,
+        background=scene.background,
+        scene=scene.data,
+    )
     if target is None:
         return io.StringIO(page)
     with whole_file(target) as stream:
         stream.write(page.encode())
     return None
-
-
-def part_of(picture: Any, renderer: Any) -> Any:
-    """Return the part of a window's picture that a renderer has drawn."""
-    (left, bottom), (width, height) = renderer.GetOrigin(), renderer.GetSize()
-    top = len(picture) - bottom - height
-    return picture[top : top + height, left : left + width]

@@ -13,7 +13,7 @@ import logging
 import secrets
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from urllib.parse import quote, urlsplit
@@ -44,9 +44,7 @@ vdi-viewer { flex: 1; min-height: 0; }
 form { position: relative; display: flex; flex-wrap: wrap; gap: 4px 16px; padding: 6px 10px;
   align-items: center; min-height: 1.5em; }
 label { display: flex; gap: 6px; align-items: center; }
-input[type="number"] { width: 6em; }
-@media (pointer: coarse) { input, select { min-height: 36px; } }
-input:invalid { outline: 2px solid #ff6060; }
+@media (pointer: coarse) { input { min-height: 36px; } }
 output { position: absolute; right: 0; bottom: 100%; max-width: 100%; box-sizing: border-box;
   padding: 4px 10px; background: #000c; text-align: right; overflow-wrap: anywhere;
   pointer-events: none; }
@@ -254,7 +252,7 @@ class Server(contextlib.AbstractContextManager["Server"]):
         """Make and send a VDI of each wish; another wish gives up what is being made."""
         loop = asyncio.get_running_loop()
         try:
-            await socket.send_json({"type": "hello", "protocol": 2, **self._source.offer})
+            await socket.send_json({"type": "hello", "protocol": 3, **self._source.offer})
             while wish := await wishes.get():
                 await socket.send_json({"type": "status", "doing": "vdi"})
                 try:
@@ -295,14 +293,13 @@ def serve(
     memory_limit: MemoryLike | None = None,
     max_clients: int = 256,
     device: DeviceLike | None = None,
-    announce: Callable[[str], object] | None = print,
     wait: bool = True,
     **classification: Any,
 ) -> Server:
     """Serve VDIs of a volume to web pages, which draw them at their own rate.
 
     A page draws the VDI that it has. Where its view rests the server makes another, of what is in
-    view. Colour map, opacity, range and time step can be changed in the page.
+    view. The time step can be changed in the page.
 
     Parameters
     ----------
@@ -326,10 +323,9 @@ def serve(
         Most pages at once.
     device : str, int or device, optional
         See :func:`pyvista_vdi.list_devices`; all clients share it, one piece of work each in turn.
-    announce : callable, optional
-        Called with a line that has the URL.
     wait : bool
-        Return when Ctrl-C ends the server; ``False`` returns it at once, and ``close()`` ends it.
+        Print the URL, and return when Ctrl-C ends the server; ``False`` returns it at once, and
+        ``close()`` ends it.
     **classification
         As for :func:`pyvista_vdi.generate`.
 
@@ -361,8 +357,7 @@ def serve(
     server = Server(
         source, host=host, port=port, token=token, hosts=hosts, max_clients=max_clients
     ).start()
-    if announce is not None:
-        announce(f"Serving at {server.url} (Ctrl-C ends it)")
     if wait:
+        print(f"Serving at {server.url} (Ctrl-C ends it)", flush=True)  # noqa: T201
         server.wait()
     return server

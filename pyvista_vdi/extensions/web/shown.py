@@ -1,9 +1,13 @@
-"""What viewers show, a VDI, a series or a set: as the file that they are sent, and as a picture."""
+"""What viewers show, a VDI, a series or a set: as the file that they are sent, and as a picture.
+
+And cameras as the viewer's JavaScript has them: VTK's names, and no more than it draws by.
+"""
 
 from __future__ import annotations
 
 import copy
 import io
+import math
 import sys
 import zipfile
 from base64 import b64encode
@@ -14,15 +18,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.api import render
-from pyvista_vdi.errors import InvalidVDIError, NoDeviceError, UnsupportedError
+from pyvista_vdi.errors import InvalidCameraError, InvalidVDIError, NoDeviceError, UnsupportedError
 from pyvista_vdi.extensions.series.archive import write_to as write_several
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
-from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
 from pyvista_vdi.io.vdi_file.writer import write_to
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI, picture_view
@@ -32,26 +36,15 @@ Shown: TypeAlias = "VDI | DeferredVDI | VDISeries | VDISet"
 #: Of deflate: files are a hundredth longer than by 6, its default, in half the time.
 EFFORT = 4
 
-#: What an output does that has a picture, for where a widget's view comes to nothing: in a page
-#: that nbconvert has written with the widget's state, which has the view in place of the picture,
-#: and fetches from elsewhere what draws it; and in a notebook that is opened without its kernel.
-#: Viewers say that they are there in ``pyvistaVDIs``, and take the picture away.
-_STAND_IN = """\
-((place) => {{
-  const show = () => {{
-    if (!place || globalThis.pyvistaVDIs?.has("{key}")) return;
-    place.insertAdjacentHTML("beforeend", '<img data-vdi="{key}" style="max-width: 100%" '
-      + 'alt="a still picture of a volume" src="data:image/png;base64,{picture}">');
-  }};
-  const views = 'script[type="application/vnd.jupyter.widget-view+json"]';
-  if (document.readyState === "loading") {{
-    document.addEventListener("DOMContentLoaded", () => {{
-      const among = [...document.querySelectorAll(views)];
-      if (among.some(({{ textContent }}) => textContent.includes("{model_id}"))) show();
-    }});
-  }} else setTimeout(show, 3000);
-}})(typeof element === "undefined" ? null : element[0] ?? element);
-"""
+#: Planes that the viewer clips a VDI to (MOST_CLIPPING_PLANES of viewer/shader.js).
+MOST_PLANES = 24
+
+_ENTRIES = (
+    "position", "focal_point", "view_up", "view_angle", "parallel_scale", "window_center",
+)  # fmt: skip
+
+#: Longest edge of the picture beside a widget, pixels.
+_STILL_EDGE = 800
 
 
 def as_shown(shown: Any) -> Shown:
@@ -93,7 +86,6 @@ def file_of(
     level: int | None = None,
     *,
     seen: VDI | None = None,
-    coarse: bool = True,
     progress: Progress | None = None,
 ) -> tuple[bytes, int]:
     """Return the file of what is shown, and how many bytes of it give a first picture.
@@ -111,7 +103,7 @@ def file_of(
         begun = kept.classified() if seen is None else seen
         lists = copy.copy(lists)
         lists.metadata = {**kept.metadata, "transfer_function": begun.metadata["transfer_function"]}
-    write_to(stream, lists, DEFLATE, level, progress, coarse=coarse)
+    write_to(stream, lists, DEFLATE, level, progress)
     with zipfile.ZipFile(stream) as archive:
         members = archive.infolist()
     behind = members[2 if members[1].filename == COARSE else 1]
@@ -128,38 +120,28 @@ def bare_file(vdi: VDI) -> bytes:
     return file_of(bare, level=EFFORT)[0]
 
 
-def picture(
+def still(
     vdi: VDI,
-    camera: dict[str, Any],
-    window_size: Sequence[int] | None = None,
+    camera: dict[str, Any] | None = None,
     *,
     background: Sequence[float] | None = None,
     clipping_planes: ArrayLike | None = None,
-    placed: ArrayLike | None = None,
-    opacity_multiplier: float = 1.0,
-) -> NDArray[np.uint8]:
-    """Return what a viewer shows: uint8 (H, W, 3) RGB, or (H, W, 4) without a background.
+) -> str | None:
+    """Return what a viewer shows of a view, by default the VDI's own, as base64 PNG.
 
-    ``placed``: the model transform, by default the VDI's own; the viewer's camera has none.
-    """
-    placed = vdi.camera.model_transform if placed is None else placed
-    view = camera_of(camera).replace(model_transform=placed)
-    how: Any = {"clipping_planes": clipping_planes, "opacity_multiplier": opacity_multiplier}
-    return to_bytes(render(vdi, view, window_size, **how), background)
-
-
-def still(vdi: VDI, camera: Any = None, *, longest: int = 800, **how: Any) -> str | None:
-    """Return a view, the VDI's own by default, as base64 PNG; ``None`` without a device.
-
-    Its longer edge has at most ``longest`` pixels. ``how``: of :func:`picture`.
+    Its longer edge has at most 800 pixels; straight RGBA without a background. ``None`` without a
+    device. The model is where it was for the VDI: the viewer's camera says nothing of it.
     """
     own, own_size = picture_view(vdi)
-    share = min(1, longest / max(own_size))
+    share = min(1, _STILL_EDGE / max(own_size))
     size = [max(1, round(edge * share)) for edge in own_size]
+    state = viewer_camera(own, own_size) if camera is None else camera
+    view = camera_of(state).replace(model_transform=vdi.camera.model_transform)
     try:
-        return png(picture(vdi, camera or viewer_camera(own, own_size), size, **how))
+        image = render(vdi, view, size, clipping_planes=clipping_planes)
     except NoDeviceError:
         return None
+    return png(to_bytes(image, background))
 
 
 def png(pixels: NDArray[np.uint8]) -> str:
@@ -181,15 +163,49 @@ def _shell() -> Any:
     return None if ipython is None else ipython.get_ipython()
 
 
-def with_still(data: Any, picture: str | None, widget: Any) -> Any:
+def with_still(data: Any, picture: str | None, key: str) -> Any:
     """Return a widget's output with a picture, base64 PNG, for where there can be no view.
 
-    In a notebook in which it has no view the picture is shown by an output of its own: of one
-    output, what shows notebooks takes the view alone.
+    What shows notebooks takes the view alone of an output that has both, and nbconvert's pages
+    fetch from elsewhere what draws that. So a kernel gives the picture an output of its own, which
+    the viewer of that ``key`` takes away when it comes: see widget.py.
     """
     if picture is None:
         return data
-    if hasattr(_shell(), "kernel"):
-        script = _STAND_IN.format(picture=picture, key=widget._key, model_id=widget.model_id)
-        _shell().display_pub.publish({"application/javascript": script})
-    return {**data, "image/png": picture}
+    if not hasattr(_shell(), "kernel"):
+        return {**data, "image/png": picture}
+    image = f'<img data-vdi="{key}" style="max-width: 100%" alt="a still picture of a volume" '
+    html = f'{image}src="data:image/png;base64,{picture}">'
+    _shell().display_pub.publish({"text/html": html, "text/plain": "a still picture of a volume"})
+    return data
+
+
+def viewer_camera(camera: Any, window_size: Sequence[int] = (1, 1)) -> dict[str, Any]:
+    """Return any camera, or a dictionary of that form, as ``viewer.camera`` takes it.
+
+    It has ``position``, ``focal_point``, ``view_up``, and ``view_angle`` (vertical, degrees) or
+    ``parallel_scale``; ``window_center`` where it is not the middle. ``window_size``: of its
+    picture, which turns a horizontal opening angle into a vertical one. InvalidCameraError if it is
+    no camera, or has other entries or values.
+    """
+    view = camera_of(camera) if isinstance(camera, dict) else Camera.from_any(camera)
+    _, half_height = view.half_extent(window_size)
+    state: dict[str, Any] = {name: list(getattr(view, name)) for name in _ENTRIES[:3]}
+    if any(view.window_center):
+        state["window_center"] = list(view.window_center)
+    if view.parallel_projection:
+        return {**state, "parallel_scale": half_height}
+    if not view.use_horizontal_view_angle:  # to the last bit
+        return {**state, "view_angle": view.view_angle}
+    return {**state, "view_angle": 2 * math.degrees(math.atan(half_height))}
+
+
+def camera_of(state: dict[str, Any]) -> Camera:
+    """Return the camera that a dictionary of the viewer's form describes; InvalidCameraError."""
+    unknown = sorted(set(state) - set(_ENTRIES))
+    if unknown:
+        raise InvalidCameraError(
+            f"a viewer's camera has {', '.join(_ENTRIES)}; got {', '.join(unknown)}"
+        )
+    parallel = "parallel_scale" in state
+    return Camera.from_dict({**state, "parallel_projection": parallel})

@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from importlib.util import find_spec
 from itertools import chain
 from typing import Any
 
@@ -19,8 +18,7 @@ import numpy as np
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
-from pyvista_vdi.extensions.web.camera import camera_of, viewer_camera
-from pyvista_vdi.extensions.web.shown import bare_file
+from pyvista_vdi.extensions.web.shown import bare_file, camera_of, viewer_camera
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.coverage import SLACK, bounds_corners, projected
@@ -30,19 +28,8 @@ from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.view import View
 from pyvista_vdi.volume.rays import checked_sample_distance
 
-#: The colour maps and opacity mappings that clients may choose.
-_CMAPS = (
-    *("viridis", "plasma", "inferno", "magma", "cividis", "turbo", "gray", "bone", "hot"),
-    *("copper", "coolwarm", "twilight", "jet"),
-)
-_OPACITIES = (
-    *("linear", "linear_r", "geom", "geom_r", "sigmoid", "sigmoid_3", "sigmoid_5"),
-    *("sigmoid_7", "sigmoid_10", "sigmoid_15", "sigmoid_20", "foreground"),
-)
 #: Longest edge of a client's picture, pixels.
 MAX_PICTURE_EDGE = 8192
-#: Most opacities of a mapping that is given by numbers.
-MAX_OPACITIES = 64
 #: Numbers are no larger than this, and lenses no smaller than its inverse: forms of rays are
 #: products of a few of them.
 _LARGEST = 1e12
@@ -57,14 +44,13 @@ class Wish:
     """What a client wants to see: the last that it has said of everything."""
 
     view: View | None = None  # its camera, and the size of its picture; ``None`` before it has said
-    look: tuple[tuple[str, Any], ...] = ()  # what it has changed of the transfer function
     step: int = 0  # of the time steps
 
 
 class Source:
     """A volume, or time steps of one, and how VDIs of it are made.
 
-    ``offer`` is what clients are told, and may choose from: the entries of hello.
+    ``offer`` is what clients are told: the entries of hello.
     """
 
     def __init__(
@@ -84,23 +70,18 @@ class Source:
             lambda step: as_volume(volumes[step], looks.scalars, looks.preference)
         )
         self._transfer_function = lru_cache(4)(
-            lambda step, look: replace(looks, **dict(look)).transfer_function_of(self._volume(step))
+            lambda step: looks.transfer_function_of(self._volume(step))
         )
         self._runtime = get_runtime(device)
         self._options, self._lists = options, lists
         # What is wrong with the look or the step is refused now, not to a client
-        first, table = self._volume(0), self._transfer_function(0, ())
-        begun: dict[str, Any] = {"cmap": looks.cmap, "opacity": looks.opacity}
+        first = self._volume(0)
+        self._transfer_function(0)
         checked_sample_distance(first, options.sample_distance)
-        free = find_spec("pyvista") is not None and not first.rgba and not looks.in_place
         self.offer: dict[str, Any] = {
             "bounds": list(first.bounds),
             "camera": viewer_camera(filling_camera(first.bounds, (4, 3))),
             "steps": len(volumes),
-            "cmaps": list(_CMAPS) if free else [],
-            "opacities": list(_OPACITIES) if free else [],
-            "look": {name: look for name, look in begun.items() if isinstance(look, str)},
-            "range": list(table.scalar_range),
         }
 
     def make(self, wish: Wish, cancelled: Callable[[], bool]) -> tuple[tuple[int, int], bytes]:
@@ -112,7 +93,7 @@ class Source:
         camera, size = wish.view.camera, wish.view.size
         # Before the device is held: these wait for each other
         volume = self._volume(wish.step)
-        look = self._transfer_function(wish.step, wish.look)
+        look = self._transfer_function(wish.step)
         # Cut the window down to what can be seen of the volume, or keep all of it where a corner is
         # behind the eye or close to it
         corners, window = bounds_corners(volume.bounds), np.asarray(size)
@@ -147,34 +128,13 @@ def wish_after(text: str, wish: Wish, offer: Mapping[str, Any]) -> Wish:
                 _numbers("a camera", [*chain(*places), lens, 1 / lens])
                 width, height = _numbers("size", size, 1, MAX_PICTURE_EDGE, whole=True)
                 return replace(wish, view=View(camera, (width, height)))
-            case {"type": "look", **look}:
-                return replace(wish, look=_look(offer, **look))  # type: ignore[arg-type]
             case {"type": "time", "step": step, **rest} if not rest:
                 (step,) = _numbers("step", [step], 0, offer["steps"] - 1, whole=True)
                 return replace(wish, step=step)
-        raise BadMessageError(f"a view, a look or a time with its entries is one; got {text:.40}")
+        raise BadMessageError(f"a view or a time with its entries is one; got {text:.40}")
     # No JSON, not the entries of its type, or no camera
     except (KeyError, TypeError, ValueError, RecursionError, VDIError) as error:
         raise BadMessageError(f"the message is none of the protocol's: {error}") from None
-
-
-def _look(
-    offer: Mapping[str, Any], cmap: Any = None, opacity: Any = None, clim: Any = None
-) -> tuple[tuple[str, Any], ...]:
-    if not offer["cmaps"]:
-        raise BadMessageError("the look is fixed")
-    if isinstance(opacity, list) and 2 <= len(opacity) <= MAX_OPACITIES:
-        opacity = _numbers("opacity", opacity, 0, 1)
-    elif opacity not in (None, *offer["opacities"]):
-        raise BadMessageError(f"opacity is a name of hello's, or 2 to {MAX_OPACITIES} numbers")
-    if cmap not in (None, *offer["cmaps"]):
-        raise BadMessageError("cmap is a name of hello's")
-    if clim is not None:
-        low, high = clim = _numbers("clim", clim)
-        if not low < high:
-            raise BadMessageError("clim must be two numbers, the smaller first")
-    said = {"cmap": cmap, "opacity": opacity, "clim": clim}
-    return tuple((name, value) for name, value in said.items() if value is not None)
 
 
 def _numbers(

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import secrets
-from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, MissingDependencyError
+from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.web import shown as of_viewers
 from pyvista_vdi.extensions.web.bundle import viewer_script
-from pyvista_vdi.extensions.web.camera import MOST_PLANES, camera_of, viewer_camera
-from pyvista_vdi.io import write_png
-from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.extensions.web.shown import MOST_PLANES, camera_of, viewer_camera
 from pyvista_vdi.model.metrics import check_background
 from pyvista_vdi.model.packing import DEPTH_CODES
 from pyvista_vdi.model.render_options import checked_planes
-from pyvista_vdi.model.vdi import VDI, picture_view
+from pyvista_vdi.model.vdi import picture_view
 
 try:
     import anywidget
@@ -56,7 +49,6 @@ function render({ model, el }) {
   const take = {
     background: takeBackground,
     _gradient: takeBackground,
-    controls: () => viewer.setAttribute("controls", model.get("controls")),
     clipping_planes() { // a scene has its own
       const planes = bytesOf("_scene").length ? [] : model.get("clipping_planes");
       viewer.clippingPlanes = planes.map((p) => ({ origin: p.slice(0, 3), normal: p.slice(3) }));
@@ -65,10 +57,9 @@ function render({ model, el }) {
       const packed = bytesOf("_scene");
       if (packed.length) viewer.scene = new Scene(packed);
     },
-    _file() { // of a subplot without VDIs there is none
+    _file() {
       timed = false;
-      const file = bytesOf("_file");
-      if (file.length) viewer.showBytes(file).catch(() => {}); // the viewer says what is wrong
+      viewer.load(bytesOf("_file")).catch(() => {}); // the viewer says what is wrong
     },
     camera() {
       if (!same(viewer.camera, model.get("camera"))) viewer.camera = model.get("camera");
@@ -79,9 +70,8 @@ function render({ model, el }) {
     },
   };
   el.replaceChildren(viewer);
-  const key = model.get("_key"); // what stands in for the viewer has it, too: shown.py
-  (globalThis.pyvistaVDIs ??= new Set()).add(key);
-  document.querySelectorAll(`img[data-vdi="${key}"]`).forEach((picture) => picture.remove());
+  const stills = `img[data-vdi="${model.get("_key")}"]`; // of shown.py, where there is no view
+  document.querySelectorAll(stills).forEach((picture) => picture.remove());
   for (const [name, taken] of Object.entries(take)) {
     taken();
     model.on(`change:${name}`, taken);
@@ -97,10 +87,6 @@ function render({ model, el }) {
   viewer.addEventListener("framedrawn", ({ detail }) => { // of a step that stays
     if (timed && detail.full && !viewer.playing) tell("time");
   });
-  if (model.get("_link")) {
-    viewer.dataset.link = model.get("_link");
-    turnTogether(viewer);
-  }
   return () => {
     cancelAnimationFrame(told);
     for (const [name, taken] of Object.entries(take)) model.off(`change:${name}`, taken);
@@ -128,16 +114,9 @@ class VDIWidget(anywidget.AnyWidget):
         The first view; by default the VDI's own.
     background : str or (float, float, float), optional
         ``"white"``, ``"#204060"`` or RGB from 0 to 1; by default the page shows through.
-    precision : {"8-byte", "exact"}, optional
-        What a supersegment of a VDI takes on its way to the browser, see
-        :meth:`pyvista_vdi.VDI.with_precision`; by default 8 bytes, or what it has where lists are
-        too long for that. Series and sets take 8 bytes.
-    controls : {"all", "none"}
-        Whether there is a bar of buttons over the picture, which fades.
     **look
         What the transfer function of a deferred VDI begins with, as for
         :meth:`pyvista_vdi.DeferredVDI.classified`: ``cmap``, ``opacity``, ``clim`` and others.
-        Pictures of the kernel, :meth:`screenshot` too, are by this one.
 
     Attributes
     ----------
@@ -154,8 +133,6 @@ class VDIWidget(anywidget.AnyWidget):
     time : float or None
         Of a series the time that is shown: that of the step at which it was paused in the browser,
         and the nearest to what is set here. A traitlet.
-    controls : str
-        As the argument. A traitlet.
 
     Raises
     ------
@@ -172,19 +149,15 @@ class VDIWidget(anywidget.AnyWidget):
     """
 
     _esm = viewer_script("scene.js", module=True) + _RENDER
-    _placed: Any = None  # where the model is in the world, where its VDI does not say it
-    _opacity_multiplier = 1.0
     _file = traitlets.Bytes().tag(sync=True)
     _scene = traitlets.Bytes().tag(sync=True)  # what else a plotter shows
     _gradient = traitlets.Unicode("").tag(sync=True)  # CSS of a plotter's background
     _picture_size = traitlets.List(traitlets.Int(), [1, 1]).tag(sync=True)
     _key = traitlets.Unicode("").tag(sync=True)
-    _link = traitlets.Unicode("").tag(sync=True)  # of those that turn together
     time = traitlets.Float(None, allow_none=True).tag(sync=True)
     camera = traitlets.Any().tag(sync=True)
     background = traitlets.Any(None).tag(sync=True)
     clipping_planes = traitlets.Any([]).tag(sync=True)
-    controls = traitlets.Enum(["all", "none"], "all").tag(sync=True)
 
     def __init__(
         self,
@@ -192,21 +165,17 @@ class VDIWidget(anywidget.AnyWidget):
         *,
         camera: Any = None,
         background: Any = None,
-        precision: str | None = None,
-        controls: str = "all",
         **look: Any,
     ) -> None:
-        one_of(controls, "controls", ("all", "none"))
-        self._precision, self._first_look = precision, look
-        self._vdi = shown = self._accept(vdi)
+        self._first_look = look
+        self._vdi = shown = of_viewers.as_shown(vdi)
         super().__init__(
             _file=self._sent(shown),
-            _picture_size=[1, 1] if shown is None else list(picture_view(shown)[1]),
+            _picture_size=list(picture_view(shown)[1]),
             _key=secrets.token_hex(8),
             camera=picture_view(shown)[0] if camera is None else camera,
             time=shown.times[0] if isinstance(shown, VDISeries) else None,
             background=background,
-            controls=controls,
         )
 
     @traitlets.validate("camera")
@@ -234,86 +203,35 @@ class VDIWidget(anywidget.AnyWidget):
 
     @vdi.setter
     def vdi(self, vdi: Any) -> None:
-        shown = self._accept(vdi)
-        self._file = self._sent(shown, coarse=False)  # the one before is better meanwhile
+        shown = of_viewers.as_shown(vdi)
+        self._file = self._sent(shown)
         self._vdi = shown
-        series = isinstance(shown, VDISeries)
-        self.time = shown.times[shown.nearest(self.time or 0.0)] if series else None
-
-    def screenshot(
-        self,
-        filename: str | os.PathLike[str] | None = None,
-        window_size: Sequence[int] | None = None,
-    ) -> NDArray[np.uint8]:
-        """Return the picture of the present view, drawn by the kernel's OpenCL device.
-
-        A cell that runs cannot wait for the browser; this does not need one.
-
-        Parameters
-        ----------
-        filename : path-like, optional
-            A ``.png`` to write it to.
-        window_size : (int, int), optional
-            Width and height in pixels; by default what the VDI was made for.
-
-        Returns
-        -------
-        numpy.ndarray
-            uint8 (H, W, 3) RGB over the background, or without one (H, W, 4) straight RGBA; top
-            row first.
-
-        Raises
-        ------
-        NoDeviceError
-            If there is no OpenCL device.
-        VDIFileError
-            If the file cannot be written.
-        """
-        seen, camera, how = self._now()
-        pixels = of_viewers.picture(seen, camera, window_size, **how)
-        if filename is not None:
-            write_png(pixels, filename)
-        return pixels
+        before, self.time = self.time, None
+        if isinstance(shown, VDISeries):
+            self.time = shown.times[shown.nearest(before or 0.0)]
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.vdi!r})"
 
-    def _accept(self, vdi: Any) -> Any:
-        """Return what can be shown, or raise InvalidVDIError."""
-        return of_viewers.as_shown(vdi)
-
-    def _now(self) -> tuple[VDI, dict[str, Any], dict[str, Any]]:
-        """Return the VDI that is seen, of a series the present step, of a set the nearest; how."""
-        if self._vdi is None:
-            raise InvalidVDIError("there is no VDI here: plotter.screenshot() is the picture")
-        seen_by = {"camera": camera_of(self.camera), "time": self.time}
-        seen = of_viewers.seen_of(self._vdi, **seen_by, **self._first_look)
-        color = self.background
-        rgb = None if color is None else [value / 255 for value in bytes.fromhex(color[1:])]
-        how = {"clipping_planes": self.clipping_planes, "placed": self._placed}
-        how["opacity_multiplier"] = self._opacity_multiplier
-        return seen, self.camera, {"background": rgb, **how}
-
-    def _sent(self, shown: Any, *, coarse: bool = True) -> bytes:
+    def _sent(self, shown: Any) -> bytes:
         """Return the file that the browser is sent."""
-        if shown is None:
-            return b""
         seen = of_viewers.seen_of(shown, **self._first_look)
-        precision = self._precision or "8-byte"
-        if self._precision is None and seen.counts.max() > DEPTH_CODES:
-            precision = "exact"
+        precision = "exact" if seen.counts.max() > DEPTH_CODES else "8-byte"
         # A cell waits for it: a twentieth more bytes than by level 6, in half the time
-        return of_viewers.file_of(shown, precision, 1, seen=seen, coarse=coarse)[0]
+        return of_viewers.file_of(shown, precision, 1, seen=seen)[0]
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """Return the view, and a picture for where there can be no view."""
         data, metadata = super()._repr_mimebundle_(**kwargs)
-        return of_viewers.with_still(data, self._still(), self), metadata
+        return of_viewers.with_still(data, self._still(), self._key), metadata
 
     def _still(self) -> str | None:
         """Return that picture as base64 PNG, if it can be had."""
-        seen, camera, how = self._now()
-        return of_viewers.still(seen, camera, **how)
+        seen_by = {"camera": camera_of(self.camera), "time": self.time}
+        seen = of_viewers.seen_of(self._vdi, **seen_by, **self._first_look)
+        color, planes = self.background, self.clipping_planes
+        rgb = None if color is None else [value / 255 for value in bytes.fromhex(color[1:])]
+        return of_viewers.still(seen, self.camera, background=rgb, clipping_planes=planes)
 
 
 def _hex(color: Any) -> str:

@@ -1,14 +1,21 @@
-"""Arrays that stand by themselves: what their names and attributes say of their axes and voxels."""
+"""Arrays that stand by themselves, in HDF5 or zarr: what is said of their axes and voxels."""
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
+from pyvista_vdi.errors import (
+    InvalidVolumeError,
+    MissingDependencyError,
+    UnsupportedError,
+    VDIError,
+    warn_external,
+)
 from pyvista_vdi.io.stores.record import AXES, Level, Store
 from pyvista_vdi.model.volume import Grid
 
@@ -92,3 +99,45 @@ def grid_of(shape: Sequence[int], spacing: Any = None, origin: Any = None) -> Gr
     nz, ny, nx = shape
     turn = np.diag(np.sign([x, y, z]))  # coordinates may fall
     return Grid((nx, ny, nz), (abs(x), abs(y), abs(z)), (at_x, at_y, at_z), turn)
+
+
+def open_hdf5(path: str, inner: str) -> Store:
+    """Open an array of an HDF5 file, by its name in it or as the only one."""
+    file = _opened(path)
+    try:
+        return array_store(path, only_array(path, inner, _arrays_in(file)), "HDF5")
+    except BaseException as error:
+        file.close()  # whoever keeps the error would keep it from being written
+        if isinstance(error, BROKEN) and not isinstance(error, VDIError):
+            raise InvalidVolumeError(f"{path} cannot be read as HDF5: {error}") from error
+        raise
+
+
+def names_in(path: str | os.PathLike[str]) -> list[str]:
+    """Return the names of the arrays of three axes or more in an HDF5 file."""
+    with _opened(os.fspath(path)) as file:
+        return list(_arrays_in(file))
+
+
+def _opened(path: str) -> Any:
+    try:
+        import h5py
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"{path} needs h5py ({error}): pip install 'pyvista-vdi[files]'"
+        ) from error
+    try:
+        return h5py.File(os.path.abspath(path), "r")  # noqa: PTH100 - links may differ elsewhere
+    except (OSError, ValueError) as error:
+        raise InvalidVolumeError(f"{path} cannot be read as HDF5: {error}") from error
+
+
+def _arrays_in(file: Any) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+
+    def visit(name: str, node: Any) -> None:
+        if hasattr(node, "shape") and node.ndim > 2 and node.dtype.kind in "biuf":
+            found[name] = node
+
+    file.visititems(visit)
+    return found

@@ -17,9 +17,6 @@ from pyvista_vdi.model.volume import Grid, Volume, chunked_array
 #: The axes of OME-Zarr, in their order.
 AXES = ("t", "c", "z", "y", "x")
 
-#: Why a level was taken that somebody has chosen.
-_ASKED_FOR = "asked for"
-
 
 @dataclass(frozen=True)
 class Level:
@@ -118,7 +115,7 @@ class Store:
 class StoredVolume(Volume):
     """A level of a store as a volume whose voxels are read chunk by chunk.
 
-    Made by :func:`open_volume`. Colours and opacities are the same for all levels, if ``clim`` is
+    Made by :func:`read_volume`. Colours and opacities are the same for all levels, if ``clim`` is
     given: lengths are the same, and opacities refer to the finest level's distance of voxels.
 
     Attributes
@@ -127,8 +124,8 @@ class StoredVolume(Volume):
         What the store says of itself: its levels, axes, unit and channels.
     level : int
         Which one this is; 0 is the finest.
-    why : str
-        Why it was chosen.
+    asked : bool
+        Whether somebody has asked for this level, so that views do not choose another.
     time : int
         Which step it is.
     channel : int or str
@@ -136,9 +133,17 @@ class StoredVolume(Volume):
     """
 
     def __init__(
-        self, store: Store, level: int, why: str, time: int = 0, channel: int | str = 0
+        self, store: Store, level: int | str, time: int = 0, channel: int | str = 0
     ) -> None:
-        chosen, index = store.levels[level], store.index(time, channel)
+        count = len(store.levels)
+        self.asked = not (isinstance(level, str) and level == "auto")
+        if self.asked and not (isinstance(level, (int, np.integer)) and 0 <= level < count):
+            raise InvalidArgumentError(
+                f'level must be "auto" or from 0, the finest, to {count - 1}, as {store.path} has '
+                f"{count}; got {level!r}"
+            )
+        self.level = int(level) if self.asked else 0
+        chosen, index = store.levels[self.level], store.index(time, channel)
         grid = chosen.grid
         number: Any = index[store.axes.index("c")] if "c" in store.axes else 0
         super().__init__(
@@ -148,60 +153,34 @@ class StoredVolume(Volume):
             grid.direction,
             name=store.channels[number] if number < len(store.channels) else "values",
         )
-        self.store, self.level, self.why = store, level, why
-        self.time, self.channel, self.unit = time, channel, store.unit
+        self.store, self.time, self.channel, self.unit = store, time, channel, store.unit
         self.unit_distance = store.levels[0].grid.default_unit_distance
 
-    def at_level(
-        self,
-        level: int | str = "auto",
-        camera: Camera | None = None,
-        window_size: Sequence[int] | None = None,
-    ) -> StoredVolume:
-        """Return another level, chosen as :func:`open_volume` does."""
-        number, why = chosen_level(self.store, level, camera, window_size)
-        return StoredVolume(self.store, number, why, self.time, self.channel)
+    def at_level(self, level: int | str) -> StoredVolume:
+        """Return another level, 0 for the finest; ``"auto"`` leaves it to the view."""
+        return StoredVolume(self.store, level, self.time, self.channel)
 
     def in_view(self, *cameras: Any, window_size: Sequence[int]) -> StoredVolume:
         """Return the finest level that one of several views requires.
 
-        It is this one if somebody has asked for it.
+        The coarsest whose voxels are still as fine as half a list's width where the volume is
+        nearest to a view; this level if somebody has asked for it.
         """
-        if self.why == _ASKED_FOR or len(self.store.levels) == 1:
+        if self.asked or len(self.store.levels) == 1:
             return self
-        each = (self.at_level("auto", camera, window_size) for camera in cameras)
-        return min(each, key=lambda one: one.level)
+        grids = [one.grid for one in self.store.levels]
+        views = map(Camera.from_any, cameras)
+        other = self.at_level(min(required_level(grids, view, window_size) for view in views))
+        other.asked = False
+        return other
 
     def at_time(self, time: int) -> StoredVolume:
         """Return another time step, by its index: ``store.times`` has as many."""
-        return StoredVolume(self.store, self.level, self.why, time, self.channel)
+        other = StoredVolume(self.store, self.level, time, self.channel)
+        other.asked = self.asked
+        return other
 
     def describe(self) -> str:
-        """Return which level it is, and why, as one line."""
+        """Return which level it is, as one line."""
         nx, ny, nz = self.dimensions
-        return (
-            f"level {self.level} of {len(self.store.levels)} ({nx} x {ny} x {nz} points): "
-            f"{self.why}"
-        )
-
-
-def chosen_level(
-    store: Store, level: int | str, camera: Any, window_size: Sequence[int] | None
-) -> tuple[int, str]:
-    """Return the level of a store that is asked for, or that a view requires, and why."""
-    count = len(store.levels)
-    if not (isinstance(level, str) and level == "auto"):
-        if not isinstance(level, (int, np.integer)) or not 0 <= level < count:
-            raise InvalidArgumentError(
-                f'level must be "auto" or from 0, the finest, to {count - 1}, as {store.path} has '
-                f"{count}; got {level!r}"
-            )
-        return int(level), _ASKED_FOR
-    if (camera is None) != (window_size is None):
-        raise InvalidArgumentError(
-            "a level is chosen for a camera and a window_size: give both, or neither for the finest"
-        )
-    if camera is None or window_size is None:
-        return 0, "the finest, as no view was given" if count > 1 else "the only one"
-    grids = [one.grid for one in store.levels]
-    return required_level(grids, Camera.from_any(camera), window_size, store.unit)
+        return f"level {self.level} of {len(self.store.levels)}: {nx} x {ny} x {nz} points"

@@ -9,8 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidVolumeError, MissingDependencyError, UnsupportedError
-from pyvista_vdi.io.axes import METRES
+from pyvista_vdi.errors import (
+    InvalidVolumeError,
+    MissingDependencyError,
+    UnsupportedError,
+    VDIError,
+)
+from pyvista_vdi.io.axes import one_unit
 from pyvista_vdi.io.stores.arrays import BROKEN, array_store, check_axes, grid_of, only_array
 from pyvista_vdi.io.stores.record import Level, Store
 
@@ -54,9 +59,9 @@ def open_zarr(path: str, inner: str) -> Store:
         return array_store(path, only_array(path, "", arrays), "zarr")
     try:
         return _multiscale(path, node, described, "ome" in attributes)
+    except VDIError as error:
+        raise error if path in str(error) else type(error)(f"{path}: {error}") from error
     except BROKEN as error:
-        if isinstance(error, (InvalidVolumeError, UnsupportedError)):
-            raise
         raise InvalidVolumeError(
             f"the metadata of {path} break OME-Zarr ({type(error).__name__}: {error}): write them "
             "anew, or open an array of it by its name, as x.zarr::0"
@@ -74,31 +79,21 @@ def _multiscale(path: str, group: Any, described: Mapping[str, Any], in_ome: boo
     kinds = {"time": "t", "channel": "c"}
     axes = tuple(kinds.get(axis.get("type"), axis["name"]) for axis in image["axes"])
     check_axes(path, axes)
-    # Bring lengths along z, y, x to one unit, that along x
-    units = [axis.get("unit") for axis in image["axes"][-3:]]
-    factors = np.ones(3)
-    if len(set(units)) > 1:
-        if any(name not in METRES for name in units):
-            raise UnsupportedError(
-                f"{path} has lengths in {', '.join(map(str, units))} along z, y, x, of which one "
-                "is not known: write them in one unit"
-            )
-        lengths = np.array([METRES[str(name)] for name in units])
-        factors = lengths / lengths[-1]
+    unit = one_unit([axis.get("unit") for axis in image["axes"][-3:]])
     levels, clock = [], (1.0, 0.0)
     for entry in image["datasets"]:
         array = group[entry["path"]]
         of_all = image.get("coordinateTransformations", ())
         steps = [*entry["coordinateTransformations"], *of_all]
         scale, translation = _placed(path, len(axes), steps)
-        grid = grid_of(array.shape[-3:], scale[-3:] * factors, translation[-3:] * factors)
+        grid = grid_of(array.shape[-3:], scale[-3:], translation[-3:])
         levels.append(Level(entry["path"], array, grid))
         if "t" in axes and scale[axes.index("t")] > 0:
             clock = float(scale[axes.index("t")]), float(translation[axes.index("t")])
     names = [channel.get("label") for channel in described.get("omero", {}).get("channels", ())]
     channels = tuple(map(str, names)) if all(names) else ()
     kind = f"OME-Zarr {version}"
-    return Store(path, tuple(levels), axes, units[-1] or "", channels, kind, clock)
+    return Store(path, tuple(levels), axes, unit, channels, kind, clock)
 
 
 def _placed(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
 import struct
 import zipfile
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,8 +21,6 @@ from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidVDIError, VDIError, VDIFileError
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.chunks import CODECS, DamagedChunkError, PackedArray, workers
-from pyvista_vdi.io.vdi_file.codes import packed_of_stored
-from pyvista_vdi.io.vdi_file.description import from_json, number
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
     DEFERRED_NAME,
@@ -33,12 +33,23 @@ from pyvista_vdi.io.vdi_file.layout import (
     LEAST_VERSION,
     MAX_DESCRIPTION_BYTES,
     Layout,
+    from_json,
     layouts,
+    number,
 )
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import aligned_empty
-from pyvista_vdi.model.packing import Arrays, check_precision
+from pyvista_vdi.model.packing import (
+    DEPTH_CODES,
+    GRID,
+    LEAST_STEP_EXPONENT,
+    TAU_CODES,
+    Arrays,
+    Codes,
+    Packed8,
+    check_precision,
+)
 from pyvista_vdi.model.vdi import VDI, with_arrays
 
 #: The first bytes: a ZIP member's local header, whose name stands at byte 30.
@@ -180,7 +191,7 @@ class _OpenFile:
             vdi = VDI(info.camera, info.window_size, *arrays, info.bounds, **about)
             if packing is not None:
                 vdi = with_arrays(vdi, replace(packing, offsets=vdi.offsets))
-            return vdi if info.deferred is None else DeferredVDI.of_lists(vdi, info.deferred)
+            return vdi if info.deferred is None else DeferredVDI(vdi, info.deferred)
         except DamagedChunkError as error:
             self._refuse(str(error))
         except OSError as error:
@@ -231,28 +242,13 @@ class _OpenFile:
         version = description.get("version")
         if isinstance(version, bool) or not isinstance(version, int) or version < 1:
             self._refuse(f"its format version is {version!r}")
-        if version < LEAST_VERSION:
-            raise VDIFileError(
-                f"{self._path} is of format version {version}, which is not read any more (from "
-                f"{LEAST_VERSION} on): generate the VDI anew"
-            )
-        if version > FORMAT_VERSION:
+        if not LEAST_VERSION <= version <= FORMAT_VERSION:
             raise VDIFileError(
                 f"{self._path} is of format version {version}, written by "
-                f"{description.get('written_by', 'a newer program')!r}; this is pyvista-vdi "
-                f"{__version__}, which reads up to version {FORMAT_VERSION}: "
-                "upgrade by pip install -U pyvista-vdi"
+                f"{description.get('written_by', 'another program')!r}; this is pyvista-vdi "
+                f"{__version__}, which reads versions {LEAST_VERSION} to {FORMAT_VERSION}: upgrade "
+                "by pip install -U pyvista-vdi, or generate the VDI anew"
             )
-        if description["format"] == DEFERRED_NAME:
-            about = description.get("deferred")
-            kept = about.get("version") if isinstance(about, dict) else None
-            if isinstance(kept, bool) or not isinstance(kept, int) or kept < 1:
-                self._refuse(f"the version of its values is {kept!r}")
-            if kept > 1:
-                raise VDIFileError(
-                    f"{self._path} keeps values in version {kept}; this is pyvista-vdi "
-                    f"{__version__}, which reads version 1: upgrade by pip install -U pyvista-vdi"
-                )
         return description
 
     def _checked_info(self) -> FileInfo:
@@ -421,3 +417,49 @@ class _OpenFile:
 
     def _refuse(self, why: str) -> NoReturn:
         raise VDIFileError(f"{self._path} is damaged: {why}; {_REMEDY}")
+
+
+def packed_of_stored(
+    step: float,
+    offsets: NDArray[np.uint64],
+    stored: Mapping[str, NDArray[Any]],
+    chunk_rows: int,
+) -> Packed8:
+    """Return the 8-byte form of what a file stores, checked.
+
+    ``step``: of the depth grid. ``stored``: what :func:`stored_rows` gives of every ``chunk_rows``
+    rows, by its name. Raises InvalidVDIError if packing gives no such codes.
+    """
+    if (offsets[1:] < offsets[:-1]).any():
+        raise InvalidVDIError("offsets must not decrease")
+    counts = np.diff(offsets).astype(np.int64)
+    mantissa, exponent = math.frexp(step)
+    if not (mantissa == 0.5 and LEAST_STEP_EXPONENT < exponent <= 105):
+        raise InvalidVDIError(f"the step of depths must be a power of two; got {step}")
+    origins, strides = stored["origin"].astype(np.int64), stored["stride"].astype(np.int64)
+    last = origins + strides * DEPTH_CODES
+    if (np.abs(origins) > GRID).any() or (last > GRID + DEPTH_CODES + 1).any():
+        raise InvalidVDIError("a list's depths lie beyond the VDI's grid")
+    occupied = counts > 0
+    if ((strides > 0) != occupied).any() or origins[~occupied].any():
+        raise InvalidVDIError("the lists with a stride are not those with supersegments")
+    # Add up the codes, which begin anew with every list and every chunk
+    gaps, thicknesses = stored["front"].astype(np.int64), stored["back"].astype(np.int64)
+    n, tau = len(gaps), stored["optical_depth"].astype(np.uint32)
+    begins = np.zeros(n, bool)
+    begins[offsets[:-1][occupied].astype(np.int64)] = True
+    begins[::chunk_rows] = True
+    runs, starts = np.cumsum(gaps + thicknesses), np.flatnonzero(begins)
+    before = runs[starts] - gaps[starts] - thicknesses[starts]
+    back = runs - np.repeat(before, np.diff(np.append(starts, n)))
+    if n and not (thicknesses.min() > 0 and back.max() <= DEPTH_CODES and tau.max() <= TAU_CODES):
+        raise InvalidVDIError("a supersegment has no thickness, or a code beyond its largest")
+    color = np.pad(stored["color"], ((0, 0), (1, 0))).view("<u4").reshape(-1)
+    codes = (back - thicknesses, back, tau, color)
+    return Packed8(
+        step,
+        offsets,
+        origins.astype(np.int32),
+        strides.astype(np.uint16),
+        Codes(*(code.astype(np.uint32, copy=False) for code in codes)).words(),
+    )

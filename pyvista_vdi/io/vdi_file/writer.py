@@ -14,9 +14,6 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.chunks import DEFAULT_LEVELS, write_chunks
-from pyvista_vdi.io.vdi_file.coarse import coarser
-from pyvista_vdi.io.vdi_file.codes import stored_rows
-from pyvista_vdi.io.vdi_file.description import describe, to_json
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
     COARSE,
@@ -27,11 +24,13 @@ from pyvista_vdi.io.vdi_file.layout import (
     INDEX,
     INDEX_DTYPE,
     Layout,
+    describe,
     layouts,
+    to_json,
     version_of,
 )
-from pyvista_vdi.model.packing import DEPTH_CODES
-from pyvista_vdi.model.vdi import VDI, Lists
+from pyvista_vdi.model.packing import DEPTH_CODES, Packed8
+from pyvista_vdi.model.vdi import VDI, Lists, length_per_depth, with_arrays
 from pyvista_vdi.model.whole_file import whole_file
 
 #: The oldest time that ZIP knows; a real one would make equal VDIs differ.
@@ -121,12 +120,72 @@ def write_to(
         archive.writestr(stored(INDEX), np.array(index, INDEX_DTYPE).tobytes())
 
 
+def coarser(vdi: VDI, step: int = 4) -> VDI:
+    """Return a VDI of every ``step``-th list along each edge, of the same view.
+
+    A list of the result is the one of ``vdi`` that the middle of its pixel lies in. The medium of
+    its supersegments is the same, so their optical depths follow the length along the new middle.
+
+    ``vdi``: what it stands for. ``step``: lists along an edge that one takes the place of. Returns:
+    Of ⌈W / step⌉ by ⌈H / step⌉ lists, exact and without metadata.
+    """
+    camera, (width, height) = vdi.camera, vdi.window_size
+    window = (-(-width // step), -(-height // step))
+    # Middles of the new pixels in list coordinates of both; the viewports' shapes differ where
+    # the window is no multiple of the step
+    grown = np.divide(camera.half_extent(window), camera.half_extent(vdi.window_size))
+    new = [(2 * np.arange(n) + 1) / n - 1 for n in window]
+    places = [
+        np.floor(((middles + centre) * g - centre + 1) / 2 * n).astype(np.int64)
+        for middles, centre, g, n in zip(
+            new, camera.window_center, grown, vdi.window_size, strict=True
+        )
+    ]
+    inside = [(p >= 0) & (p < n) for p, n in zip(places, vdi.window_size, strict=True)]
+    x, y = (np.clip(p, 0, n - 1) for p, n in zip(places, vdi.window_size, strict=True))
+    taken = (y[:, np.newaxis] * width + x).ravel()
+    counts = np.where(np.outer(*inside[::-1]).ravel(), vdi.counts.reshape(-1)[taken], 0)
+    # Offsets of the lists that are taken, one after the other, and which supersegments are theirs
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    rows = np.repeat(vdi.offsets.view(np.int64)[taken] - offsets[:-1], counts)
+    rows += np.arange(offsets[-1])
+    old = [(2 * p + 1) / n - 1 for p, n in zip((x, y), vdi.window_size, strict=True)]
+    stretch = length_per_depth(camera, window, *new) / length_per_depth(
+        camera, vdi.window_size, *old
+    )
+    tau = vdi.optical_depth[rows] * np.repeat(stretch.ravel(), counts)
+    arrays = vdi.arrays.take(offsets, rows)._replace(optical_depth=tau.astype(np.float32))
+    return with_arrays(vdi, arrays, camera=camera, window_size=window, metadata={})
+
+
 def stored(name: str) -> zipfile.ZipInfo:
     """Return how a member is written: the same bytes at any time, on every system."""
     info = zipfile.ZipInfo(name, date_time=_NO_TIME)
     info.create_system = 3
     info.external_attr = 0o644 << 16
     return info
+
+
+def stored_rows(packed: Packed8, name: str, first: int, last: int) -> NDArray[Any]:
+    """Return rows of an array as files store it: see :func:`packed_of_stored`.
+
+    Of ``front`` how far it is behind the back before it, in codes, and of ``back`` how far it is
+    behind its front. The first gap of a list is 0, as its code is; that of row ``first`` is its
+    front's code.
+    """
+    if name in ("origin", "stride"):
+        return (packed.origins if name == "origin" else packed.strides)[first:last]
+    front, back, tau, color = packed.codes(slice(first, last))
+    if name == "back":
+        return back - front
+    if name == "optical_depth":
+        return tau
+    if name == "color":
+        return color.astype("<u4").view(np.uint8).reshape(-1, 4)[:, 1:]
+    gaps = np.append(front[:1], front[1:] - back[:-1])
+    begin, end = np.searchsorted(packed.offsets, [first, last])
+    gaps[packed.offsets[begin:end].astype(np.int64) - first] = 0
+    return gaps
 
 
 def _encoder(

@@ -112,14 +112,9 @@ def _volume(path: Path, slices: list[Any], name: str) -> VolumeInFile:
         warn_external(f"{what} do not say how large pixels are, and 1 mm is taken: give spacing=")
     decoded = lru_cache(maxsize=1)(pixel_array)  # once for all frames of a file
     if any(len(one.position) != 3 or len(one.turn) != 6 for one in slices):
-        step = float(first.header.get("SliceThickness") or columns)
-        warn_external(
-            f"{what} do not say where they lie or how they are turned: rows are taken to run along "
-            f"y, slices along z, {step:g} apart, in an order that may be the wrong one"
+        raise InvalidVolumeError(
+            f"{what} do not say where they lie or how they are turned: {REMEDY}"
         )
-        files = [one.file for one in slices]
-        array = stack(files, lambda i: _values(slices[i], decoded)[::-1], mixed=True)
-        return VolumeInFile(array, "zyx", to_world((columns, rows, step)), name, "mm")
     if any(
         not np.array_equal(one.spacing, first.spacing)
         or not np.allclose(one.turn, first.turn, atol=1e-3)

@@ -16,35 +16,25 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
-from pyvista_vdi.io.axes import in_one_unit, one_unit, to_world
+from pyvista_vdi.io.axes import one_unit, to_world
 from pyvista_vdi.io.stores import is_store
-from pyvista_vdi.io.time_steps import lists_steps, natural_key
 from pyvista_vdi.io.volumes.dicom import dicom
 from pyvista_vdi.io.volumes.in_file import REMEDY, Lazy, VolumeInFile, head_of, stack
 
-#: Units of length in NIfTI, types in MRC, and what OME and ImageJ call a micrometre.
-_UNITS = {1: "m", 2: "mm", 3: "um"}
-_MODES = {0: "i1", 1: "i2", 2: "f4", 6: "u2", 12: "f2"}
+#: What OME and ImageJ call a micrometre.
 _MICRONS = ("um", "µm", "\\u00b5m", "micron", "microns")
 
 
 def nrrd(file: Path) -> list[VolumeInFile]:
-    """Return the volume of an NRRD file, in the coordinates that its ``space`` names.
-
-    What pynrrd does not put together SimpleITK does: data in several files, other axes, borders.
-    """
+    """Return the volume of an NRRD file, in the coordinates that its ``space`` names."""
     import nrrd
 
-    head = head_of(file).partition(b"\n\n")[0].decode("latin-1")
-    apart = re.search(r"(?im)^(data ?file: *(LIST|\S*%)|axis ?m)", head)
-    header: Any = {} if apart else nrrd.read_header(str(file))
-    if header.get("dimension") != 3 or {*header.get("kinds", ())} - {"domain", "space", "???"}:
-        array, axes, place = _by_itk(file)
-        # ITK turns frames that grow to the right and the front: turn them back
-        right, front = (re.search(f"(?im)^space: *{n}", head) for n in ("r", r"([rl]a|\w+-a)"))
-        signs = [-1 if right else 1, -1 if front else 1, 1, 1]
-        return [VolumeInFile(array, axes, np.diag(signs) @ place)]
-
+    header: Any = nrrd.read_header(str(file))
+    others = {*header.get("kinds", ())} - {"domain", "space", "???"}
+    if header["dimension"] != 3 or others or "axis mins" in header:
+        raise UnsupportedError(
+            f"{file} has other axes than x, y and z, or borders in place of points: {REMEDY}"
+        )
     steps = header.get("space directions", header.get("spacings", np.ones(3)))
     place = to_world(np.transpose(steps), header.get("space origin", np.zeros(3)))
     units = [str(unit) for unit in header.get("space units", header.get("units", ("", "", "")))]
@@ -76,9 +66,8 @@ def itk(file: Path) -> list[VolumeInFile]:
 
 
 def nifti(file: Path) -> list[VolumeInFile]:
-    """Return the volume of a NIfTI or Analyze file, in its own frame: right, front, head."""
+    """Return the volume of a NIfTI or Analyze file, in its own frame: right, front, head; mm."""
     array, axes, place = _by_itk(file)
-    # Take from the header what ITK rounds, brings to millimetres or decides otherwise
     head = head_of(file.with_name(re.sub(r"(?i)\.img(?=$|\.)", ".hdr", file.name)))
     order = "<" if head[:4] == b"\x5c\x01\0\0" else ">"
     real, short = (partial(np.frombuffer, head, f"{order}{kind}") for kind in ("f4", "i2"))
@@ -95,40 +84,11 @@ def nifti(file: Path) -> list[VolumeInFile]:
     slope, shift = real(2, 112)
     if shift and np.isfinite(shift) and not (slope and np.isfinite(slope)):
         array = array - array.dtype.type(shift)  # which ITK adds where values are not scaled
-    steps, (quaternion, sform) = np.abs(real(3, 80).astype(np.float64)), short(2, 252)
-    steps[steps == 0] = 1.0
-    if head[344:347] not in (b"n+1", b"ni1"):
-        return [VolumeInFile(array, axes, to_world(steps), unit="mm")]
-    if sform > 0:
-        place[:3] = real(12, 280).reshape(3, 4)
-    elif quaternion > 0:
-        turn = np.diag([-1, -1, 1]) @ place[:3, :3] / np.linalg.norm(place[:3, :3], axis=0)
-        place = to_world(turn * steps, real(3, 268))
+    if head[344:347] in (b"n+1", b"ni1") and short(2, 252).any():  # it is placed by a form
+        place = np.diag([-1, -1, 1, 1]) @ place
     else:
-        place = to_world(steps)
-    return [VolumeInFile(array, axes, place, unit=_UNITS.get(head[123] & 7, ""))]
-
-
-def mrc(file: Path) -> list[VolumeInFile]:
-    """Return an MRC or CCP4 map, axes as MAPC, MAPR and MAPS have them; lengths in angstrom.
-
-    SimpleITK refuses maps that begin elsewhere than at a cell's corner, and half floats.
-    """
-    head = head_of(file)
-    order = "<" if 0 < int.from_bytes(head[64:68], "little") < 4 else ">"
-    words, reals = (np.frombuffer(head, f"{order}{kind}4", 56) for kind in "if")
-    shape, mode, mapped = words[2::-1].tolist(), int(words[3]), words[16:19].tolist()
-    if head[208:212] != b"MAP " or mode not in _MODES or sorted(mapped) != [1, 2, 3]:
-        raise ValueError(f"it is no map, or of a mode ({mode}) that is none of {[*_MODES]}")
-    axes = "".join("?xyz"[n] for n in mapped)
-    counts = np.maximum(words[7:10], 1)
-    step = np.where(reals[10:13] > 0, reals[10:13].astype(np.float64) / counts, 1.0)
-    origin = reals[49:52].astype(np.float64)
-    if not origin.any():  # CCP4's maps have whole voxels in place of an origin
-        origin = step * [words[4 + axes.index(a)] for a in "xyz"]
-    dtype, begin = np.dtype(f"{order}{_MODES[mode]}"), 1024 + int(words[23])
-    array = np.fromfile(file, dtype, offset=begin)[: np.prod(shape)].reshape(shape)
-    return [VolumeInFile(array, axes[::-1], to_world(step, origin), unit="angstrom")]
+        place = to_world(np.linalg.norm(place[:3, :3], axis=0))
+    return [VolumeInFile(array, axes, place, unit="mm")]
 
 
 def numpy(file: Path) -> list[VolumeInFile]:
@@ -188,7 +148,7 @@ def _described(opened: Any, number: int, page: Any) -> tuple[list[float], str, l
         units = [of_ome[0].get(f"PhysicalSize{axis}Unit", "µm") for axis in "XYZ"]
         names = [channel.get("Name", "") for channel in of_ome[0].findall("{*}Channel")]
         if x:
-            size, unit = in_one_unit([float(x), float(y or 1), float(z or 1)], units)
+            size, unit = [float(x), float(y or 1), float(z or 1)], one_unit(units)
         if x and not z:
             said = f"{opened.filename} says that pixels are {x} x {y}, and not how far apart slices"
             warn_external(f"{said} are: spacing is taken as 1; give spacing=(x, y, z)")
@@ -199,9 +159,12 @@ def _described(opened: Any, number: int, page: Any) -> tuple[list[float], str, l
         unit = str(entries.get("unit", "")).replace("pixel", "")
         unit = "um" if unit in _MICRONS else unit
         names = [str(n) for n in entries.get("Labels", ())]
-    elif opened.is_lsm:  # of Zeiss, in metres
-        size, unit = [1e6 * float(opened.lsm_metadata[f"VoxelSize{a}"]) for a in "XYZ"], "um"
     return size, unit, names
+
+
+def natural_key(name: str) -> str:
+    """Return the sort key by which step 10 comes after step 9."""
+    return re.sub(r"\d+", lambda number: number[0].zfill(24), name)
 
 
 def slices_in(folder: Path) -> list[Path]:
@@ -268,9 +231,8 @@ _TABLE: Any = (
     ("NIfTI", ".nii .nii.gz .hdr .img .img.gz", nifti, "SimpleITK"),
     ("MetaImage", ".mha .mhd", itk, "SimpleITK"),
     ("GIPL, MINC 2", ".gipl .gipl.gz .mnc", itk, "SimpleITK"),
-    ("MRC", ".mrc .map .ccp4 .mrcs .st .ali", mrc, "numpy", ""),
     ("DICOM", ".dcm .ima", dicom, "pydicom", "files", (b"DICM",)),
-    ("TIFF", ".tif .tiff .btf .tf8 .lsm", tiff, "tifffile", "files", _TIFF),
+    ("TIFF", ".tif .tiff .btf .tf8", tiff, "tifffile", "files", _TIFF),
     ("HDF5", ".h5 .hdf5 .he5 .hdf .nxs", None, "h5py", "files", (b"\x89HDF",)),
     ("NumPy", ".npy .npz", numpy, "numpy", "", (b"\x93NUMPY",)),
     ("PNG slices", ".png", pictures, "PIL", ""),
@@ -296,8 +258,6 @@ def format_of(path: str | os.PathLike[str]) -> VolumeFormat:
         return FORMATS["PNG slices" if slices_in(file) else "DICOM"]
     elif not file.is_file() or not file.stat().st_size:
         why = "cannot be read as a volume: it is empty, or no file"
-    elif lists_steps(file):
-        why = "lists time steps: name the file of one, or make a series (pyvista-vdi series)"
     elif name.endswith((".vdi", ".exr", ".html")):
         why = "is a VDI, not a volume: 'pyvista-vdi render' and 'view' show it"
     if why:

@@ -16,7 +16,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
     VDIError,
 )
-from pyvista_vdi.io.stores import names_in, open_store
+from pyvista_vdi.io.stores import names_in, open_store, store_at
 from pyvista_vdi.io.volumes.formats import VolumeFormat, format_of
 from pyvista_vdi.io.volumes.in_file import REMEDY, VolumeInFile, chosen, placed, volume_of
 from pyvista_vdi.model.volume import Volume
@@ -38,12 +38,15 @@ def read_volume(
 
     The format is known by the name, or else by the content. Coordinates are the file's own:
     those of NIfTI grow to the right, the front and the head, those of DICOM and of most MetaImages
-    to the left, the back and the head. A store is opened, not read: see :func:`open_volume`.
+    to the left, the back and the head. Of a store only the
+    metadata are read now, and its voxels chunk by chunk, where a part is needed: it is a
+    :class:`StoredVolume` (docs/large_volumes.md).
 
     Parameters
     ----------
     path : path-like
-        Any file of the table in ``docs/files.md``; ``"x.h5::/path"`` is an array in a store.
+        Any file of the table in ``docs/files.md``; a store, ``"x.zarr"``, ``"x.ome.zarr"``
+        (OME-Zarr 0.4 or 0.5), or an HDF5 file; ``"x.h5::/path"`` is an array in it.
     array, series : int or str, optional
         Which one, by its number or its name, where a file holds several; both mean the same.
     channel : int or str, optional
@@ -51,7 +54,7 @@ def read_volume(
     time : int, optional
         Which time step, where there are several.
     level : int or "auto", optional
-        Level of a store's multi-scale image; 0, the finest, by default.
+        Level of a store's multi-scale image, 0 is the finest; by default it is left to the view.
     spacing, origin : (float, float, float), optional
         In place of those of the file, along x, y and z.
 
@@ -108,7 +111,7 @@ def list_volumes(path: str | os.PathLike[str]) -> list[VolumeInFile]:
             return volumes_in(file)
     inside = [f"{file}::{name}" for name in names_in(path)] if file.is_file() else [path]
     found = []
-    for store in (open_store(each).store for each in inside):
+    for store in map(store_at, inside):
         axes = "".join(axis[:1] for axis in store.axes)
         for level in store.levels:
             known = (level.grid.index_to_model, level.path, store.unit, store.channels)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.vtk_pipeline.drawing.screen import fill_viewport
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, Held, watch
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, HeldByVTK, watch
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkStreamingDemandDrivenPipeline
@@ -45,7 +45,7 @@ class Box(Algorithm):
         self.components = 1
         self._stands = False
         self._far: tuple[Any, Any] | None = None  # origin and spacing, in a frame of what is far
-        self._watched: tuple[Held, int] | None = None
+        self._watched: tuple[HeldByVTK, int] | None = None
         self.Update()
         self.image = self.GetOutputDataObject(0)
 
@@ -65,13 +65,13 @@ class Box(Algorithm):
 
     def connect(self) -> None:
         """Follow what the input is made of, which may be something else by now."""
-        port = None if self._shown is None else self._shown.before()
+        port = None if self._shown is None else self._shown.port
         if self._watched is not None:
             self._watched[0].get().RemoveObserver(self._watched[1])
         self._watched = None
         if port is not None:
             producer = port.GetProducer()
-            self._watched = Held(producer), watch(producer, self, Box._executed, "EndEvent")
+            self._watched = HeldByVTK(producer), watch(producer, self, Box._executed, "EndEvent")
         self.SetInputConnection(port)
         self._executed()  # what fails from the first has no bounds either
 
@@ -135,12 +135,6 @@ class Box(Algorithm):
         """Announce the voxels."""
         key = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
         outputs.GetInformationObject(0).Set(key, _EXTENT, 6)
-        return 1
-
-    def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Ask for what the input asks for."""
-        if self._shown is not None and self.GetNumberOfInputConnections(0) > 0:
-            self._shown.ask(inputs)
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:

@@ -431,7 +431,6 @@ class Driver:
                     seen = replace(seen, first_look=False, **known)
         except Cancelled as error:
             if self._volume is None and source.last() is None:
-                source.forget_view()
                 raise
             self._complain(error)
             planned, sighted, shown = Plan("vdi"), None, self._volume or source.last()
@@ -610,11 +609,8 @@ class Driver:
         """Make the VDI of the source now; what fails is not repeated until something changes."""
         try:
             source.vdi()
-        except Cancelled:  # of one execution
+        except (Cancelled, InvalidVolumeError):  # of one execution, or soon found again
             raise
-        except InvalidVolumeError:  # soon found again
-            if not source.has_what_it_had():
-                raise  # else as VTK's mappers, which draw the data that are there
         except BaseException:
             self._failed = (*self._failed[-1:], source.stamp())
             raise

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
 from pyvista_vdi.model.checks import Number
-from pyvista_vdi.model.cropping import checked_opacity_multiplier
 from pyvista_vdi.model.render_options import (
     TRANSMITTANCE_CUTOFF,
     checked_bound,
     checked_draw,
+    checked_opacity_multiplier,
     checked_policy,
     checked_rate,
     checked_transmittance_cutoff,

@@ -1,4 +1,4 @@
-"""What this package's VTK algorithms share: how they say what went wrong, and what they ask for."""
+"""What this package's VTK algorithms share: settings, errors, times, and a volume property."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import Any
 
 from pyvista_vdi.errors import Cancelled, InvalidVDIError, VDIError
 from pyvista_vdi.vtk_pipeline import vtk
+from pyvista_vdi.vtk_pipeline.filters.properties import check_property, color_function
 
-TIME_STEPS = vtk.vtkStreamingDemandDrivenPipeline.TIME_STEPS()
-TIME_RANGE = vtk.vtkStreamingDemandDrivenPipeline.TIME_RANGE()
-UPDATE_TIME_STEP = vtk.vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
+_PIPELINE = vtk.vtkStreamingDemandDrivenPipeline
+TIME_STEPS = _PIPELINE.TIME_STEPS()
+UPDATE_TIME_STEP = _PIPELINE.UPDATE_TIME_STEP()
 
 
 class Algorithm(vtk.VTKPythonAlgorithmBase):
@@ -27,47 +28,30 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
 
     def __init__(self, **ports: Any) -> None:
         super().__init__(**ports)
+        self._set: dict[str, Any] = {}  # settings that are not their defaults, by names
         self._error: BaseException | None = None
         self._python_waits = False
         self._before: Any = None
 
     def SetInputDataObject(self, *args: Any) -> None:
         """Set the input (optionally after a port number, 0)."""
-        for each in args:
-            vtk.require_this_build(type(each))
+        vtk.require_this_build(type(args[-1]))
         super().SetInputDataObject(*args)
         self._before = None
 
     def SetInputConnection(self, *args: Any) -> None:
         """Set what makes the input, a port of another algorithm (optionally after a number)."""
-        for each in args:
-            vtk.require_this_build(type(each))
+        vtk.require_this_build(type(args[-1]))
         super().SetInputConnection(*args)
         # Of an algorithm in Python VTK holds no more than what is written in C++
         self._before = None if args[-1] is None else args[-1].GetProducer()
 
+    def SetInputData(self, data: Any) -> None:
+        """Set the input."""
+        self.SetInputDataObject(data)
+
     def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""
-        if not self._updated(*args):
-            failed = f"what is before {type(self).__name__} failed: VTK's output window says why"
-            connected = self.GetNumberOfInputConnections(0) > 0
-            raise self.bad_input(failed if connected else self._no_input())
-
-    def _no_input(self) -> str:
-        return f"{type(self).__name__} has no input: call SetInputDataObject or SetInputConnection"
-
-    def UpdateTimeStep(self, time: float, *args: Any) -> None:
-        """Bring the output up to date as of a time, and raise what went wrong.
-
-        The time stays asked for until another one is. Pieces and ghosts, which VTK's method takes
-        as well, make no difference: images come whole.
-        """
-        self.UpdateInformation()
-        self.GetOutputInformation(0).Set(UPDATE_TIME_STEP, float(time))
-        self.Update()
-
-    def _updated(self, *args: Any) -> bool:
-        """Update, and return whether what is before this algorithm went well."""
         self._python_waits = True
         try:
             if args:
@@ -81,7 +65,21 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
         if error is not None:
             self.Modified()  # so that the next update tries again
             raise error
-        return bool(done)
+        if not done:
+            raise self.bad_input(
+                f"{type(self).__name__} has no input (SetInputDataObject, SetInputConnection), or "
+                "what is before it failed: then VTK's output window says why"
+            )
+
+    def UpdateTimeStep(self, time: float, *args: Any) -> None:
+        """Bring the output up to date as of a time, and raise what went wrong.
+
+        The time stays asked for until another one is. Pieces and ghosts, which VTK's method takes
+        as well, make no difference: images come whole.
+        """
+        self.UpdateInformation()
+        self.GetOutputInformation(0).Set(UPDATE_TIME_STEP, float(time))
+        self.Update()
 
     def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Ask for the whole input, whatever part of the output is wanted."""
@@ -97,10 +95,9 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
         except BaseException as error:  # VTK would print it and go on (or exit, on Ctrl-C)
             self._error = error
             if not self._python_waits and not isinstance(error, Cancelled):
-                name = type(self).__name__
-                known = isinstance(error, VDIError)
-                said = error if known else f"{type(error).__name__}: {error}".rstrip(": ")
-                vtk.vtkOutputWindow.GetInstance().DisplayErrorText(f"{name}: {said}\n")
+                said = error if isinstance(error, VDIError) else repr(error)
+                window = vtk.vtkOutputWindow.GetInstance()
+                window.DisplayErrorText(f"{type(self).__name__}: {said}\n")
             if self.GetNumberOfOutputPorts():
                 vtk.vtkDataObject.GetData(outputs, 0).Initialize()
         return 1
@@ -108,13 +105,34 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
     def _execute(self, inputs: Any, outputs: Any) -> None:
         raise NotImplementedError
 
-    def _change(self, attribute: str, value: Any) -> None:
-        if getattr(self, attribute) != value:
-            setattr(self, attribute, value)
+    def _change(self, name: str, value: Any, default: Any = None) -> None:
+        """Keep a setting, and be out of date where it is another value."""
+        if self._set.get(name, default) != value:
+            self._set[name] = value
             self.Modified()
 
 
-class Held:
+def accessors(
+    name: str,
+    what: str,
+    default: Any = None,
+    check: Callable[..., Any] = lambda value: value,
+) -> tuple[Callable[..., None], Callable[..., Any]]:
+    """Return an algorithm's Set and Get of a setting; ``check`` returns a value as it is kept."""
+
+    def setter(self: Any, *value: Any, **named: Any) -> None:
+        self._change(name, check(*value, **named), default)
+
+    def getter(self: Any) -> Any:
+        return self._set.get(name, default)
+
+    setter.__doc__, getter.__doc__ = f"Set {what}.", f"Return {what}."
+    for method, verb in ((setter, "Set"), (getter, "Get")):
+        method.__name__ = f"{verb}{name.title().replace('_', '')}"
+    return setter, getter
+
+
+class HeldByVTK:
     """A VTK object that an attribute keeps alive in C++ alone: what the user hands to an algorithm.
 
     Before 9.7 VTK frees a node of its table of wrappers twice (``vtkPythonUtil::FindObject``)
@@ -129,6 +147,50 @@ class Held:
     def get(self) -> Any:
         """Return the object."""
         return self._holder.GetItemAsObject(0)
+
+
+class Classifying(Algorithm):
+    """An algorithm that is out of date when its volume property is changed."""
+
+    _property: HeldByVTK | None = None
+    _observed: tuple[tuple[HeldByVTK, int], ...] = ()
+
+    def SetVolumeProperty(self, prop: Any) -> None:
+        """Set the volume property; later changes to it make the output out of date.
+
+        Raises
+        ------
+        UnsupportedError, InvalidArgumentError
+            If it cannot be honoured: see ``transfer_function_from_property``. Functions without
+            points may be filled later, before the next update.
+        """
+        if prop is not None:
+            check_property(prop, rgba=not prop.GetIndependentComponents())
+        if prop is not self.GetVolumeProperty():
+            self._property = None if prop is None else HeldByVTK(prop)
+            self._observe_property()
+            self.Modified()
+
+    def GetVolumeProperty(self) -> Any:
+        """Return the volume property."""
+        return None if self._property is None else self._property.get()
+
+    def _observe_property(self) -> None:
+        """Modify this algorithm whenever the property or one of its functions is modified."""
+        for watched, tag in self._observed:
+            watched.get().RemoveObserver(tag)
+        self._observed, prop = (), self.GetVolumeProperty()
+        if prop is None:
+            return
+        there = [prop, color_function(prop), prop.GetScalarOpacity()]
+        if prop.HasGradientOpacity():
+            there.append(prop.GetStoredGradientOpacity())
+
+        def changed(algorithm: Classifying) -> None:
+            algorithm._observe_property()  # its functions may be others now
+            algorithm.Modified()
+
+        self._observed = tuple((HeldByVTK(each), watch(each, self, changed)) for each in there)
 
 
 def watch(
@@ -148,12 +210,6 @@ def watch(
     return int(thing.AddObserver(event, modified))
 
 
-def whole_extent(information: Any) -> tuple[int, ...] | None:
-    """Return the extent that a port announces, if it does."""
-    key = vtk.vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
-    return information.Get(key) if information is not None and information.Has(key) else None
-
-
 def announce(
     outputs: Any, window_size: tuple[int, int], scalars: tuple[int, int] = (vtk.VTK_UNSIGNED_INT, 1)
 ) -> None:
@@ -164,8 +220,7 @@ def announce(
     """
     width, height = window_size
     information = outputs.GetInformationObject(0)
-    extent = (0, width - 1, 0, height - 1, 0, 0)
-    information.Set(vtk.vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT(), extent, 6)
+    information.Set(_PIPELINE.WHOLE_EXTENT(), (0, width - 1, 0, height - 1, 0, 0), 6)
     information.Set(vtk.vtkImageData.SPACING(), (1.0, 1.0, 1.0), 3)
     information.Set(vtk.vtkImageData.ORIGIN(), (0.0, 0.0, 0.0), 3)
     vtk.vtkDataObject.SetPointDataActiveScalarInfo(information, *scalars)
@@ -176,15 +231,10 @@ def announce_times(outputs: Any, times: Sequence[float]) -> None:
     information = outputs.GetInformationObject(0)
     if times:
         information.Set(TIME_STEPS, times, len(times))
-        information.Set(TIME_RANGE, (times[0], times[-1]), 2)
+        information.Set(_PIPELINE.TIME_RANGE(), (times[0], times[-1]), 2)
     else:
         information.Remove(TIME_STEPS)
-        information.Remove(TIME_RANGE)
-
-
-def announced_times(information: Any) -> tuple[float, ...]:
-    """Return the times of the steps that a port announces."""
-    return tuple(information.Get(TIME_STEPS) or ()) if information.Has(TIME_STEPS) else ()
+        information.Remove(_PIPELINE.TIME_RANGE())
 
 
 def wanted_time(information: Any) -> float | None:
@@ -192,21 +242,9 @@ def wanted_time(information: Any) -> float | None:
     return information.Get(UPDATE_TIME_STEP) if information.Has(UPDATE_TIME_STEP) else None
 
 
-def is_aborted(algorithm: Any) -> bool:
-    """Whether an algorithm or one before it was told to stop, which leaves values out."""
-    there = [algorithm]
-    for each in there:
-        for port in range(each.GetNumberOfInputPorts()):
-            for i in range(each.GetNumberOfInputConnections(port)):
-                before = each.GetInputAlgorithm(port, i)
-                if before not in there:
-                    there.append(before)
-    return any(each.GetAbortExecute() for each in there)
-
-
 def ask_for_all(inputs: Any) -> None:
     """Ask for the whole input, whatever part of the output is wanted."""
     information = inputs[0].GetInformationObject(0)
-    extent = whole_extent(information)
-    if extent is not None:
-        information.Set(vtk.vtkStreamingDemandDrivenPipeline.UPDATE_EXTENT(), extent, 6)
+    if information is not None and information.Has(_PIPELINE.WHOLE_EXTENT()):
+        whole = information.Get(_PIPELINE.WHOLE_EXTENT())
+        information.Set(_PIPELINE.UPDATE_EXTENT(), whole, 6)

@@ -17,9 +17,8 @@ from pyvista_vdi.errors import (
     InvalidVolumeTypeError,
     UnknownArrayError,
     UnsupportedError,
-    with_article,
 )
-from pyvista_vdi.io.vdi_file.description import plain_number
+from pyvista_vdi.io.vdi_file.layout import plain_number
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI, Lists
@@ -43,58 +42,21 @@ FORM_VERSION = 2
 #: Ragged arrays in field data, with their number of components.
 _RAGGED = {"front": 1, "back": 1, "color": 3, "optical_depth": 1}
 
-_RESAMPLE = (
-    "resample it: pyvista.ImageData(...).sample(grid), or vtkResampleToImage (in ParaView the "
-    "filter Resample To Image)"
-)
-
-#: What to do with data sets that are not uniform grids.
-_REMEDIES = {
-    "vtkRectilinearGrid": _RESAMPLE,
-    "vtkStructuredGrid": _RESAMPLE,
-    "vtkUnstructuredGrid": _RESAMPLE,
-    "vtkCompositeDataSet": "add its blocks one by one (vtkExtractBlock, or block by index)",
-    "vtkPolyData": "a surface has no volume: voxelise it (pyvista's voxelize_binary_mask)",
-}
-
 
 def require_image(data: Any) -> vtk.vtkImageData:
     """Return ``data`` if it is a uniform grid, and say how to make one of anything else."""
     if isinstance(data, vtk.vtkImageData):
         return data
+    vtk.require_this_build(type(data))
     if not hasattr(data, "GetClassName"):
         raise InvalidVolumeTypeError(
             f"expected a vtkImageData or pyvista.ImageData; got {type(data).__name__}"
         )
-    vtk.require_this_build(type(data))
-    raise _refusal(type(data))
-
-
-def require_image_port(port: Any) -> None:
-    """Refuse an output port that is known to give something other than a uniform grid.
-
-    A port that promises no more than a ``vtkDataSet``, say, passes.
-    """
-    vtk.require_this_build(type(port))
-    information = port.GetProducer().GetOutputPortInformation(port.GetIndex())
-    name = str(information.Get(vtk.vtkDataObject.DATA_TYPE_NAME()))
-    promised = getattr(vtk.vtkCommonDataModel, name, None)
-    if (
-        promised is None
-        or issubclass(promised, vtk.vtkImageData)
-        or issubclass(vtk.vtkImageData, promised)
-    ):
-        return
-    raise _refusal(promised)
-
-
-def _refusal(kind: type) -> UnsupportedError:
-    named = f"{with_article(kind.__name__)} is not a uniform grid"
-    for name, remedy in _REMEDIES.items():
-        if issubclass(kind, getattr(vtk.vtkCommonDataModel, name)):
-            return UnsupportedError(f"{named}, which is all that a VDI is made from: {remedy}")
-    return UnsupportedError(
-        f"{named} (vtkImageData), which is all that a VDI is made from: resample it to one"
+    raise UnsupportedError(
+        f"{type(data).__name__} is not a uniform grid, which is all that a VDI is made from: "
+        "resample a grid (pyvista.ImageData(...).sample(grid), vtkResampleToImage, or in ParaView "
+        "Resample To Image), take the blocks of a composite one by one, and voxelise a surface by "
+        "PyVista (surface.voxelize_binary_mask())"
     )
 
 
@@ -102,19 +64,17 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
     """Return a VTK image's scalars and geometry: see :meth:`pyvista_vdi.Volume.from_vtk`."""
     image = require_image(image)
     array = scalars_of(image, scalars, preference)
-    rgba = array.GetNumberOfComponents() == 4 and array.GetDataType() == vtk.VTK_UNSIGNED_CHAR
-    if array.GetNumberOfComponents() != 1 and not rgba:
-        n = array.GetNumberOfComponents()
+    n = array.GetNumberOfComponents()
+    rgba = n == 4 and array.GetDataType() == vtk.VTK_UNSIGNED_CHAR
+    if n != 1 and not rgba:
         raise UnsupportedError(
-            f"the scalars {array.GetName()!r} have 4 components, but are not RGBA of type unsigned "
-            "char: convert them, or pass one scalar per point"
-            if n == 4
-            else f"the scalars {array.GetName()!r} have {n} components: a VDI is made from one "
-            "scalar per point; pass one component, or the vectors' length"
+            f"the scalars {array.GetName()!r} have {n} components: a VDI is made from one scalar "
+            "per point (one component, or the vectors' length), or from RGBA of type unsigned char"
         )
     dimensions = image.GetDimensions()
     name = array.GetName() or "values"
-    of_cells = is_of_cells(image, array)
+    points = image.GetPointData()
+    of_cells = all(points.GetArray(i) is not array for i in range(points.GetNumberOfArrays()))
     if of_cells:
         if min(dimensions) < 2:
             raise InvalidVolumeError(
@@ -128,41 +88,16 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
         to_points.SetInputData(cells)
         to_points.Update()
         array = to_points.GetOutput().GetPointData().GetScalars()
-    direction = image.GetDirectionMatrix()
+    direction, first = image.GetDirectionMatrix(), [0.0, 0.0, 0.0]
+    image.TransformIndexToPhysicalPoint(*image.GetExtent()[::2], first)
     return Volume(
         as_numpy(array).reshape((*dimensions[::-1], 4) if rgba else dimensions[::-1]),
         image.GetSpacing(),
-        first_point(image),
+        first,
         [[direction.GetElement(i, j) for j in range(3)] for i in range(3)],
         name=name,
         blanked=_blanked(image, of_cells),
     )
-
-
-def is_of_cells(data: Any, array: vtk.vtkDataArray) -> bool:
-    """Whether an array of a data set's is none of its points'."""
-    points = data.GetPointData()
-    return all(points.GetArray(i) is not array for i in range(points.GetNumberOfArrays()))
-
-
-def first_point(image: vtk.vtkImageData) -> list[float]:
-    """Return where the first point of an image lies, whatever its extent begins with."""
-    first: list[float] = [0.0, 0.0, 0.0]
-    image.TransformIndexToPhysicalPoint(*image.GetExtent()[::2], first)
-    return first
-
-
-def ghosts_of(image: vtk.vtkImageData) -> dict[str, NDArray[np.uint8]]:
-    """Return the ghost arrays that mark anything, of "point" and "cell", (nz, ny, nx)."""
-    nx, ny, nz = image.GetDimensions()
-    found = {}
-    for kind, array, shape in (
-        ("point", image.GetPointGhostArray(), (nz, ny, nx)),
-        ("cell", image.GetCellGhostArray(), (nz - 1, ny - 1, nx - 1)),
-    ):
-        if array is not None and (values := as_numpy(array)).any():
-            found[kind] = values.reshape(shape)
-    return found
 
 
 def _blanked(image: vtk.vtkImageData, of_cells: bool) -> NDArray[np.uint8] | None:
@@ -175,9 +110,15 @@ def _blanked(image: vtk.vtkImageData, of_cells: bool) -> NDArray[np.uint8] | Non
     """
     own = image.GetPointData().GetArray(BLANKED)
     blanked = None if own is None else as_numpy(own).reshape(image.GetDimensions()[::-1])
-    for kind, marks in ghosts_of(image).items():
-        cells = kind == "cell" and of_cells
-        texels = np.pad(marks > 0, (0, 1)) if kind == "cell" and not cells else marks > 0
+    nx, ny, nz = image.GetDimensions()
+    for cells, array, shape in (
+        (False, image.GetPointGhostArray(), (nz, ny, nx)),
+        (True, image.GetCellGhostArray(), (nz - 1, ny - 1, nx - 1)),
+    ):
+        if array is None or not (marks := as_numpy(array).reshape(shape) > 0).any():
+            continue
+        texels = np.pad(marks, (0, 1)) if cells and not of_cells else marks
+        cells &= of_cells
         points = [n + cells for n in texels.shape]
         texels = np.pad(texels, 1, mode="edge")
         octants = np.zeros(points, np.uint8)
@@ -228,8 +169,7 @@ def scalars_of(
         for array in arrays[kind]:
             if array.GetName() == name:
                 return array
-    lower = {each.lower(): each for each in reversed(names) if each}
-    near = [lower[m] for m in difflib.get_close_matches(str(name).lower(), list(lower), n=1)]
+    near = difflib.get_close_matches(str(name), [each for each in names if each], n=1)
     hint = f"did you mean {near[0]!r}? Its" if near else "its"
     raise UnknownArrayError(f"the volume has no array {name!r}: {hint} arrays are {names}")
 
@@ -241,7 +181,7 @@ def as_numpy(array: vtk.vtkDataArray) -> NDArray[Any]:
         plain.DeepCopy(array)
         return vtk.vtk_to_numpy(plain)  # type: ignore[no-any-return]
     values: NDArray[Any] = vtk.vtk_to_numpy(array)
-    # NumPy's own array rather than one that keeps VTK's, which has an attribute: see Held
+    # NumPy's own array rather than one that keeps VTK's, which has an attribute: see HeldByVTK
     lent = getattr(array, "_numpy_reference", values)
     theirs, ours = ((a.dtype, a.size, a.ctypes.data) for a in (lent, values))
     return lent.reshape(values.shape) if theirs == ours else values
@@ -344,8 +284,22 @@ def vdi_from_image(image: Any) -> VDI | DeferredVDI:
             f"this {kind} is not a VDI: it has no field string {DESCRIPTION!r}; a volume becomes "
             "a VDI by pyvista_vdi.generate or VDISource"
         )
-    about = view_of_image(image)
-    kept = about.pop("deferred", None)
+    # Read everything that is not an array
+    try:
+        about = json.loads(image.GetFieldData().GetAbstractArray(DESCRIPTION).GetValue(0))
+        version, camera = int(about["form_version"]), about["camera"]
+        view = Camera.from_dict(camera) if version <= FORM_VERSION else None
+        entries = {key: about[key] for key in ("bounds", "depth_origin", "metadata")}
+    except (
+        *(KeyError, TypeError, IndexError, ValueError, OverflowError, RecursionError),
+        InvalidCameraError,
+    ) as error:
+        raise InvalidVDIError(f"the VDI's description is damaged: {error!r}") from error
+    if view is None:
+        raise InvalidVDIError(
+            f"the VDI's VTK form has version {version}, and this pyvista-vdi reads up to "
+            f"{FORM_VERSION}: update pyvista-vdi"
+        )
     # Where each list begins, and where the last one ends
     counts = _counts_of(image)
     offsets = np.zeros(len(counts) + 1, dtype=np.uint64)
@@ -359,33 +313,10 @@ def vdi_from_image(image: Any) -> VDI | DeferredVDI:
             arrays[name] = np.zeros((0, 3) if components == 3 else 0, dtype=np.float32)
         else:
             raise InvalidVDIError(f"the VDI's image lacks its field array {name!r}")
-    vdi = VDI(window_size=image.GetDimensions()[:2], offsets=offsets, **arrays, **about)
-    return vdi if kept is None else DeferredVDI.of_lists(vdi, kept)
-
-
-def view_of_image(image: vtk.vtkImageData) -> dict[str, Any]:
-    """Return what the description of a VDI's image says: arguments of :class:`VDI`.
-
-    And ``deferred`` where values are kept: what a :class:`DeferredVDI` is about.
-    """
-    try:
-        about = json.loads(image.GetFieldData().GetAbstractArray(DESCRIPTION).GetValue(0))
-        version = int(about["form_version"])
-        if version <= FORM_VERSION:
-            camera = Camera.from_dict(about["camera"])
-            entries = {key: about[key] for key in ("bounds", "depth_origin", "metadata")}
-            if "deferred" in about:
-                entries["deferred"] = about["deferred"]
-            return {"camera": camera, **entries}
-    except (
-        *(KeyError, TypeError, IndexError, ValueError, OverflowError, RecursionError),
-        InvalidCameraError,
-    ) as error:
-        raise InvalidVDIError(f"the VDI's description is damaged: {error!r}") from error
-    raise InvalidVDIError(
-        f"the VDI's VTK form has version {version}, and this pyvista-vdi reads up to "
-        f"{FORM_VERSION}: update pyvista-vdi"
-    )
+    size = image.GetDimensions()[:2]
+    vdi = VDI(camera=view, window_size=size, offsets=offsets, **arrays, **entries)
+    kept = about.get("deferred")
+    return vdi if kept is None else DeferredVDI(vdi, kept)
 
 
 def _counts_of(image: vtk.vtkImageData) -> NDArray[Any]:

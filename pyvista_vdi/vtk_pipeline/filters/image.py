@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
+import math
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -10,26 +11,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io import to_bytes
-from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_number, not_taken
+from pyvista_vdi.model.checks import Number
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.model.vdi import VDI, picture_size, picture_view
+from pyvista_vdi.model.vdi import VDI, picture_view
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
+    Classifying,
+    accessors,
     announce,
     ask_for_all,
-    whole_extent,
 )
-from pyvista_vdi.vtk_pipeline.filters.classifying import Classifying
-from pyvista_vdi.vtk_pipeline.filters.convert import (
-    is_vdi_image,
-    to_vtk,
-    vdi_from_image,
-    view_of_image,
-)
+from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, to_vtk, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
+from pyvista_vdi.vtk_pipeline.filters.source import checked_size
 from pyvista_vdi.vtk_pipeline.filters.view import camera_of
 from pyvista_vdi.vtk_pipeline.vtk import VTK_UNSIGNED_CHAR, vtkImageData
 
@@ -40,13 +36,7 @@ SCALARS = (VTK_UNSIGNED_CHAR, 4)
 #: Its other point array: what was rendered, premultiplied RGBA, float32.
 PREMULTIPLIED = "premultiplied"
 
-
-def _checked_degrees(value: Any) -> float:
-    """Return an angle as a float, or raise InvalidArgumentError."""
-    degrees = as_number(value)
-    if not np.isfinite(degrees):
-        raise not_taken(value)(f"a view is turned by a finite angle, degrees; got {value!r}")
-    return degrees
+_DEGREES = Number("finite degrees", -math.inf, open_ended=True, name="the angle of a view")
 
 
 class VDIToImage(Classifying):
@@ -67,15 +57,27 @@ class VDIToImage(Classifying):
     image.
     """
 
+    SetAzimuth, GetAzimuth = accessors(
+        "azimuth",
+        "by how much the view is turned about its up direction through the focal point, degrees",
+        0.0,
+        _DEGREES,
+    )
+    SetElevation, GetElevation = accessors(
+        "elevation", "by how much the view is lifted after turning it, degrees", 0.0, _DEGREES
+    )
+    SetDevice, GetDevice = accessors("device", "the OpenCL device; ``None`` is the default one")
+    SetWindowSize, GetWindowSize = accessors(
+        "window_size",
+        "the picture's width and height in pixels; ``None`` is :attr:`VDI.picture_size`",
+        check=checked_size,
+    )
+    _, GetCamera = accessors("camera", "the view before it is turned; ``None``: the generating one")
+
     def __init__(self) -> None:
         super().__init__(
             nInputPorts=1, inputType="vtkImageData", nOutputPorts=1, outputType="vtkImageData"
         )
-        self._camera: Camera | None = None
-        self._azimuth = 0.0
-        self._elevation = 0.0
-        self._window_size: tuple[int, int] | None = None
-        self._device: Any = None
         self._vdi: VDI | DeferredVDI | None = None
         self._vdi_of: tuple[str, int] | None = None
         self._look: VDI | None = None
@@ -96,48 +98,7 @@ class VDIToImage(Classifying):
         InvalidCameraError, UnsupportedError
             If it is no camera, or has what the optical model has no place for.
         """
-        view = None if camera is None else camera_of(camera, model_transform)
-        self._change("_camera", view)
-
-    def GetCamera(self) -> Camera | None:
-        """Return the view before it is turned, or ``None`` for the generating view."""
-        return self._camera
-
-    def SetAzimuth(self, degrees: float) -> None:
-        """Turn the view about its up direction through the focal point, as VTK's ``Azimuth``."""
-        self._change("_azimuth", _checked_degrees(degrees))
-
-    def GetAzimuth(self) -> float:
-        """Return by how much the view is turned, degrees."""
-        return self._azimuth
-
-    def SetElevation(self, degrees: float) -> None:
-        """Lift the view through the focal point, after turning it, as VTK's ``Elevation``."""
-        self._change("_elevation", _checked_degrees(degrees))
-
-    def GetElevation(self) -> float:
-        """Return by how much the view is lifted, degrees."""
-        return self._elevation
-
-    def SetDevice(self, device: Any) -> None:
-        """Choose the OpenCL device; ``None`` is the default one."""
-        self._change("_device", device)
-
-    def GetDevice(self) -> Any:
-        """Return the device as it was set."""
-        return self._device
-
-    def SetWindowSize(self, *size: Any) -> None:
-        """Set the picture's width and height in pixels.
-
-        ``None``, the default, is :attr:`VDI.picture_size`.
-        """
-        pair = size[0] if len(size) == 1 else size
-        self._change("_window_size", None if pair is None else check_window_size(pair))
-
-    def GetWindowSize(self) -> tuple[int, int] | None:
-        """Return the picture's width and height in pixels, or ``None`` for the VDI's."""
-        return self._window_size
+        self._change("camera", None if camera is None else camera_of(camera, model_transform))
 
     def GetImage(self) -> vtkImageData:
         """Return the picture, brought up to date.
@@ -151,34 +112,26 @@ class VDIToImage(Classifying):
         return self.GetOutputDataObject(0)
 
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Announce the output's extent: one point per pixel."""
-        announce(outputs, self._window_size or self._announced_size(inputs) or (1, 1), SCALARS)
-        return 1
-
-    def _announced_size(self, inputs: Any) -> tuple[int, int] | None:
-        """Return the size of the pictures that the VDI was made for, as far as it is known."""
-        size = getattr(self.GetInputAlgorithm(0, 0), "picture_size", None)
-        if size is not None:
-            return size  # type: ignore[no-any-return]
+        """Announce the output's extent, one point per pixel, as far as it is known before."""
         image = vtkImageData.GetData(inputs[0], 0)
-        if is_vdi_image(image):
-            with contextlib.suppress(InvalidVDIError):  # _execute says it
-                metadata = view_of_image(image)["metadata"]
-                return picture_size(image.GetDimensions()[:2], metadata)
-        whole = whole_extent(inputs[0].GetInformationObject(0))
-        return (whole[1] - whole[0] + 1, whole[3] - whole[2] + 1) if whole else None
+        size = self.GetWindowSize() or getattr(self.GetInputAlgorithm(0, 0), "picture_size", None)
+        if size is None and is_vdi_image(image):
+            with suppress(InvalidVDIError):  # _execute says it
+                size = picture_view(self._read(image))[1]
+        announce(outputs, size or (1, 1), SCALARS)
+        return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
         vdi = self._classified(self._read(vtkImageData.GetData(inputs[0], 0)))
-        own, own_size = picture_view(vdi)
-        view = own if self._camera is None else self._camera
-        view = view.azimuth(self._azimuth) if self._azimuth else view
-        view = view.elevation(self._elevation) if self._elevation else view
-        size = self._window_size or own_size
+        view, size = picture_view(vdi)
+        view = self.GetCamera() or view
+        view = view.azimuth(self.GetAzimuth()) if self.GetAzimuth() else view
+        view = view.elevation(self.GetElevation()) if self.GetElevation() else view
+        size = self.GetWindowSize() or size
         # Known only now, where another program's reader gives the VDI
         announce(outputs, size, SCALARS)
         ask_for_all([outputs])
-        pixels = render_vdi(vdi, FrameRequest(view, size, device=self._device))
+        pixels = render_vdi(vdi, FrameRequest(view, size, device=self.GetDevice()))
         vtkImageData.GetData(outputs, 0).ShallowCopy(rgba_to_image(pixels))
 
     def _classified(self, vdi: VDI | DeferredVDI) -> VDI:
@@ -194,8 +147,7 @@ class VDIToImage(Classifying):
         key = (self._vdi_of, prop.GetAddressAsString(""), prop.GetMTime())
         if self._look is None or key != self._look_of:
             table = transfer_function_from_property(prop)
-            self._look = classify_on_device(vdi, table, self._device)
-            self._look_of = key
+            self._look, self._look_of = classify_on_device(vdi, table, self.GetDevice()), key
         return self._look
 
     def _read(self, image: vtkImageData) -> VDI | DeferredVDI:
@@ -204,8 +156,7 @@ class VDIToImage(Classifying):
         # algorithm's last attribute goes that is data (vtkPythonUtil::FindObject)
         key = (image.GetAddressAsString(""), image.GetMTime()) if is_vdi_image(image) else None
         if self._vdi is None or key is None or key != self._vdi_of:
-            self._vdi = vdi_from_image(image)
-            self._vdi_of = key
+            self._vdi, self._vdi_of = vdi_from_image(image), key
         return self._vdi
 
 

@@ -20,12 +20,12 @@ from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.classified_values import classify_on_device
-from pyvista_vdi.vtk_pipeline.filters.algorithm import ask_for_all, wanted_time
+from pyvista_vdi.vtk_pipeline.filters.algorithm import wanted_time
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import View, camera_of
-from pyvista_vdi.vtk_pipeline.vtk import require_this_build
+from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData
 
 #: What two equal sizes of pixels differ by at most.
 ROUNDING = 1e-6
@@ -45,10 +45,14 @@ class Input:
     deferred: DeferredVDI | None = None
     #: The volume property that classifies values, where they are kept.
     prop: Any = None
+    #: The port of what the bounds depend on; ``None`` where they depend on nothing.
+    port: Any = None
     #: What remedies a view that the VDI does not serve, where there is no source.
     remedy = "without its volume it cannot be made anew"
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
     period: int | None = None
+    #: Whether something goes on that the event loop has to look at.
+    busy = False
 
     def __init__(self, vdi: VDI | None = None) -> None:
         self._vdi = vdi
@@ -62,8 +66,9 @@ class Input:
         return self._vdi
 
     def bounds(self) -> tuple[float, ...] | None:
-        """Return the bounds in the model frame, without making a VDI."""
-        return None if self._vdi is None else self._vdi.bounds
+        """Return the bounds in the model frame, without making a VDI of a volume."""
+        vdi = self.vdi()
+        return None if vdi is None else vdi.bounds
 
     def stamp(self) -> Any:
         """Return something that changes whenever it is worth trying again."""
@@ -81,23 +86,9 @@ class Input:
         """Return the VDIs, values and volumes that devices may hold because of this."""
         return [self._vdi]
 
-    def forget_view(self) -> None:
-        """Wait for the view of another frame, where that of a frame was taken."""
-
     def shared(self) -> Input:
         """Return an input of the same VDI for another mapper."""
         return self
-
-    def before(self) -> Any:
-        """Return the port of what the bounds depend on; ``None`` where they depend on nothing."""
-
-    def ask(self, inputs: Any) -> None:
-        """Ask what is before for as much as is needed."""
-        ask_for_all(inputs)
-
-    def has_what_it_had(self) -> bool:
-        """Whether the data of the VDI made last are still there, though an update fails."""
-        return False
 
     def watch(self, changed: Callable[..., Any] | None) -> None:
         """Call this when what is before it may be another; ``None`` ends it."""
@@ -107,15 +98,10 @@ class Input:
         return self
 
     def rest(self) -> None:
-        """End what goes on behind the frames, which may begin anew."""
+        """End what goes on in the background, which may begin anew."""
 
     def look(self, camera: Camera, device: Any) -> None:
         """Choose what a view shows, before a frame."""
-
-    @property
-    def busy(self) -> bool:
-        """Whether something goes on that the event loop has to look at."""
-        return False
 
     def advance(self) -> bool | None:
         """Take what is due between two frames; whether there is another VDI to be drawn.
@@ -131,6 +117,30 @@ class Input:
     def parts(self) -> list[tuple[VDI, float]]:
         """Return the VDIs that a picture is blended of, with weights; none for one."""
         return []
+
+
+class ImageInput(Input):
+    """A canonical image, from a port of any algorithm that makes one."""
+
+    def __init__(self, port: Any) -> None:
+        super().__init__()
+        self.port = port
+        self._producer = port.GetProducer()  # a port does not keep its algorithm
+        self._read_at: int | None = None
+
+    def vdi(self) -> VDI | None:
+        """Return the VDI, brought up to date."""
+        self._producer.Update(self.port.GetIndex())
+        image = self._producer.GetOutputDataObject(self.port.GetIndex())
+        if self._vdi is None or self._read_at != image.GetMTime():
+            self._vdi, self._read_at = as_vdi(vdi_from_image(image)), image.GetMTime()
+        return self._vdi
+
+    def stamp(self) -> Any:
+        """Return the newest time stamp of all that it depends on."""
+        self._producer.UpdateInformation()
+        time = wanted_time(self._producer.GetOutputInformation(self.port.GetIndex()))
+        return self._producer.GetMTime(), time
 
 
 class SourceInput(Input):
@@ -183,34 +193,22 @@ class SourceInput(Input):
         """Return the VDI made last."""
         return self.source.GetCurrentVDI()
 
+    @property
+    def port(self) -> Any:  # type: ignore[override]
+        """The port that the volume comes from."""
+        connected = self.source.GetNumberOfInputConnections(0) > 0
+        return self.source.GetInputConnection(0, 0) if connected else None
+
     def bounds(self) -> tuple[float, ...] | None:
-        """Return the bounds of the volume, brought up to date."""
-        return self.source.GetInputBounds()
-
-    def before(self) -> Any:
-        """Return the port that the volume comes from."""
-        source = self.source
-        connected = source.GetNumberOfInputConnections(0) > 0
-        return source.GetInputConnection(0, 0) if connected else None
-
-    def has_what_it_had(self) -> bool:
-        """Whether the data at the source's input are still those of the VDI made last."""
-        made = self.source.GetCurrentRequest()
-        return made is not None and self.source.GetVolume() is made.volume
-
-    def ask(self, inputs: Any) -> None:
-        """Ask for what the source asks for."""
-        self.source.RequestUpdateExtent(None, inputs, None)
+        """Return the bounds of the volume, brought up to date; ``None`` where there is none."""
+        return bounds_before(self.source)
 
     def stamp(self) -> Any:
         """Return the newest time stamp of all that it depends on."""
-        if self.source.GetNumberOfInputConnections(0) > 0:
-            self.source.UpdateInput()
-        stamps = [self.source.GetMTime()]
-        data = self.source.GetInputDataObject(0, 0)
-        prop = self.source.GetVolumeProperty()
-        stamps += [thing.GetMTime() for thing in (data, prop) if thing is not None]
-        return max(stamps)
+        source, prop = self.source, self.source.GetVolumeProperty()
+        data = None if self.port is None else source.UpdateInput()
+        there = (source, data, prop)
+        return max(thing.GetMTime() for thing in there if thing is not None)
 
     def note_scene(self, renderers: Sequence[Any], model_transform: NDArray[np.float64]) -> None:
         """Note a renderer that shows it, for its lights, unless none does, and where it stands."""
@@ -247,10 +245,12 @@ class SourceInput(Input):
         source = self.source
         if not self.has_view:
             source.MakeRequest(self.view_for(camera, size, model_transform))
-        if source.GetCamera() is None:
+        given = source.GetCamera()
+        if given is None:
             self.take_camera(camera, model_transform)
         elif self.of_scene and self._camera is None and source.GetCurrentRequest() is None:
-            source.PlaceCamera(model_transform)  # one that was given with the volume
+            # One that was given with the volume
+            source.SetCamera(given.replace(model_transform=model_transform))
         if source.GetWindowSize() is None:
             self.take_size(size)
 
@@ -292,14 +292,6 @@ class SourceInput(Input):
             wanted = replace(wanted, generating=(camera, size))
         return wanted
 
-    def forget_view(self) -> None:
-        """Wait for the view of another frame, where that of a frame was taken."""
-        if self._camera is not None and self.source.GetCamera() is self._camera:
-            self.source.SetCamera(None)
-        if self._size is not None and self.source.GetWindowSize() == self._size:
-            self.source.SetWindowSize(None)
-        self._camera = self._size = None
-
     def take_camera(self, camera: Any, model_transform: NDArray[np.float64]) -> None:
         """Set a renderer's view as that of the next VDI."""
         self.source.SetCamera(camera, model_transform)
@@ -326,92 +318,18 @@ class SourceInput(Input):
                 self.take_size(size)
 
     def on_devices(self) -> list[Any]:
-        """Return the VDI, the volume that it was made of, and that which was read last."""
+        """Return the VDI, and the volume that it was made of."""
         made = self.source.GetCurrentRequest()
-        read = self.source.GetCurrentVolume()
-        return [self.last(), read, None if made is None else made.volume]
-
-
-class ImageInput(Input):
-    """A canonical image, from a data object or from any algorithm that makes one."""
-
-    def __init__(self, image: Any = None, port: Any = None) -> None:
-        super().__init__()
-        self._image = image
-        self._port = port
-        # A port does not keep its algorithm; what is connected in VTK does
-        self._producer: Any = None if port is None else port.GetProducer()
-        self._read_at: int | None = None
-
-    def vdi(self) -> VDI | None:
-        """Return the VDI, brought up to date."""
-        if self._port is not None:
-            self._producer.Update(self._port.GetIndex())
-            self._image = self._producer.GetOutputDataObject(self._port.GetIndex())
-        image = self._image
-        if self._vdi is None or self._read_at != image.GetMTime():
-            self._vdi = as_vdi(vdi_from_image(image))
-            self._read_at = image.GetMTime()
-        return self._vdi
-
-    def before(self) -> Any:
-        """Return the port that the image comes from."""
-        return self._port
-
-    def bounds(self) -> tuple[float, ...] | None:
-        """Return the bounds: the volume's, or those of the updated image."""
-        vdi = self.vdi()
-        return None if vdi is None else vdi.bounds
-
-    def stamp(self) -> Any:
-        """Return the newest time stamp of all that it depends on."""
-        if self._port is not None:
-            self._producer.UpdateInformation()
-            time = wanted_time(self._producer.GetOutputInformation(self._port.GetIndex()))
-            return self._producer.GetMTime(), time
-        return self._image.GetMTime()
-
-
-class LateValues:
-    """Values of a volume that are made once, of the first view that there is.
-
-    Then the volume is let go of.
-    """
-
-    def __init__(self, source: VDISource) -> None:
-        self._source: VDISource | None = source
-        self._made: DeferredVDI | None = None
-        self._bounds = source.GetInputBounds()
-
-    @property
-    def bounds(self) -> Any:
-        """The volume's, or those of what was made, model frame."""
-        return self._bounds if self._made is None else self._made.bounds
-
-    def take_view(
-        self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
-    ) -> None:
-        """Make them of this view, or of a camera that was given."""
-        if self._source is not None and self._source.GetWindowSize() is None:
-            if self._source.GetCamera() is None:
-                self._source.SetCamera(camera)
-            self._source.PlaceCamera(model_transform)
-            self._source.SetWindowSize(size)
-
-    def get(self) -> DeferredVDI | None:
-        """Return the values, made now if they are not yet; ``None`` without a view."""
-        source: Any = self._source
-        if source is not None and source.GetWindowSize() is not None:
-            made = source.GetVDI()
-            warn_of_range(made, source.GetVolume())
-            self._made, self._source = made, None
-        return self._made
+        return [self.last(), None if made is None else made.volume]
 
 
 class DeferredInput(Input):
-    """Values that a volume property classifies, anew when it has changed; no volume is needed."""
+    """Values that a volume property classifies, anew when it has changed; no volume is needed.
 
-    def __init__(self, values: DeferredVDI | LateValues, prop: Any) -> None:
+    Those of a source are made once, of the first view that there is; then the volume is let go of.
+    """
+
+    def __init__(self, values: DeferredVDI | VDISource, prop: Any) -> None:
         super().__init__()
         self._values, self.prop = values, prop
         self._made_at: Any = None
@@ -421,14 +339,24 @@ class DeferredInput(Input):
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
         """The values, made now if they are not yet; ``None`` without a view to make them of."""
-        return self._values.get() if isinstance(self._values, LateValues) else self._values
+        source: Any = self._values
+        if isinstance(source, VDISource):
+            if source.GetWindowSize() is None:
+                return None
+            made: Any = source.GetVDI()
+            warn_of_range(made, source.GetVolume())
+            self._values = made
+        return self._values  # type: ignore[return-value]
 
     def set_view_if_missing(
         self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
     ) -> None:
-        """Take the view of a frame as that of the values, if there is none yet."""
-        if isinstance(self._values, LateValues):
-            self._values.take_view(camera, size, model_transform)
+        """Take the view of a frame, or a camera that was given, as that of the values."""
+        source = self._values
+        if isinstance(source, VDISource) and source.GetWindowSize() is None:
+            given = source.GetCamera() or camera_of(camera, model_transform)
+            source.SetCamera(given.replace(model_transform=model_transform))
+            source.SetWindowSize(size)
 
     def on_devices(self) -> list[Any]:
         """Return the VDI and its values."""
@@ -463,13 +391,25 @@ class DeferredInput(Input):
         """Return one of the same values: whoever shares this one keeps the property."""
         return DeferredInput(self._values, prop)
 
-    def bounds(self) -> tuple[float, ...]:
+    def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds in the model frame."""
-        return self._values.bounds
+        values = self._values
+        return bounds_before(values) if isinstance(values, VDISource) else values.bounds
 
     def stamp(self) -> Any:
         """Return the time stamp of the property and its functions."""
         return self.prop.GetMTime()
+
+
+def bounds_before(source: VDISource) -> tuple[float, ...] | None:
+    """Return the bounds of a source's volume, model frame; ``None`` where there is no volume.
+
+    Its input is brought up to date, as by VTK's mappers, because many filters announce other
+    bounds than they give; no VDI is made.
+    """
+    data: Any = source.UpdateInput() if source.GetNumberOfInputConnections(0) > 0 else None
+    known = isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0
+    return tuple(data.GetBounds()) if known else None
 
 
 def input_of(data: Any) -> Input:
@@ -478,14 +418,11 @@ def input_of(data: Any) -> Input:
         return Input(data)
     if isinstance(data, DeferredInput):
         return data
-    if isinstance(data, DeferredVDI):
-        as_vdi(data)  # raises, and says what to do
     if isinstance(data, VDISource):
         return SourceInput(data)
-    if is_vdi_image(data):
-        image = ImageInput(data)
-        image.vdi()  # refuse a damaged one now
-        return image
+    if isinstance(data, DeferredVDI) or is_vdi_image(data):
+        # Of values this raises, and says what to do
+        return Input(as_vdi(data if isinstance(data, DeferredVDI) else vdi_from_image(data)))
     show = registry.shown(data)
     if show is not None:
         return show(data)  # type: ignore[no-any-return]
@@ -502,6 +439,6 @@ def input_of_port(port: Any) -> Input:
     producer = port.GetProducer()
     if isinstance(producer, VDISource):
         return SourceInput(producer)
-    image = ImageInput(port=port)
+    image = ImageInput(port)
     image.vdi()  # refuse what is no VDI now
     return image

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pyvista_vdi.errors import (
-    Cancelled,
     InvalidArgumentError,
     InvalidVolumeError,
     UnsupportedError,
-    VDIError,
     warn_external,
 )
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import as_float, as_floats, as_range, not_taken, one_of
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import (
@@ -28,16 +29,17 @@ from pyvista_vdi.model.options import (
     QualityTarget,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.types import CameraLike, LightsLike
 from pyvista_vdi.model.vdi import VDI, screen_metadata
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.targets import generate_to_target, warn_missed
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     UPDATE_TIME_STEP,
+    Classifying,
+    accessors,
     announce,
     ask_for_all,
-    is_aborted,
     wanted_time,
-    whole_extent,
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     require_image,
@@ -45,14 +47,19 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_to_image,
     volume_from_vtk,
 )
+from pyvista_vdi.vtk_pipeline.filters.option_methods import OptionMethods
 from pyvista_vdi.vtk_pipeline.filters.properties import (
     INTERPOLATION,
     check_property,
     transfer_function_from_property,
 )
-from pyvista_vdi.vtk_pipeline.filters.source_settings import SourceSettings
-from pyvista_vdi.vtk_pipeline.filters.view import View
-from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData
+from pyvista_vdi.vtk_pipeline.filters.view import View, camera_of
+from pyvista_vdi.vtk_pipeline.vtk import (
+    require_this_build,
+    vtkDataObject,
+    vtkImageData,
+    vtkWeakReference,
+)
 
 
 @dataclass(frozen=True)
@@ -91,7 +98,32 @@ class Request:
         )
 
 
-class VDISource(SourceSettings):
+def checked_options(options: GenerationOptions) -> GenerationOptions:
+    """Return options whose steps are of a length that there can be."""
+    distance = options.sample_distance
+    if distance is not None and not 0 < as_float(distance) < np.inf:
+        raise not_taken(distance)(
+            f"sample_distance must be a positive length in model units; got {distance!r}"
+        )
+    return options
+
+
+def checked_size(*size: Any) -> tuple[int, int] | None:
+    """Return a window's size, given as two numbers or as a pair; ``None`` as it is."""
+    return None if size == (None,) else check_window_size(size[0] if len(size) == 1 else size)
+
+
+def checked_deferral(*given: Any, **named: Any) -> Deferral:
+    """Return when scalars are classified; lists in it tell whether others are the same."""
+    found, lists = Deferral(*given, **named), {}
+    if found.importance is not None:
+        lists["importance"] = as_floats(found.importance).tolist()
+    if found.value_range is not None:
+        lists["value_range"] = as_range(found.value_range)
+    return replace(found, **lists)
+
+
+class VDISource(OptionMethods, Classifying):
     """Generate a VDI from the volume at its input.
 
     One ``vtkImageData`` in; out comes the VDI in its canonical VTK form (see
@@ -104,52 +136,194 @@ class VDISource(SourceSettings):
     Notes
     -----
     :meth:`SetCamera` keeps a copy of the view: turning the renderer's camera afterwards does not
-    regenerate, unless :meth:`SetTrackCamera` asks for it. Without a camera, a :class:`VDIMapper`
-    behind it sets the view of its first frame that has something to draw. Settings are checked when
-    they are set. Python's ``Update`` and :meth:`GetVDI` raise what went wrong; an update that VTK
-    asks for writes it to VTK's output window and gives an empty image.
+    regenerate. Without a camera, a :class:`VDIMapper` behind it sets the view of its first frame
+    that has something to draw. Settings are checked when they are set. Python's ``Update`` and
+    :meth:`GetVDI` raise what went wrong; an update that VTK asks for writes it to VTK's output
+    window and gives an empty image.
 
-    ``ProgressEvent`` is invoked while it works, and ``SetAbortExecute(1)`` or
-    ``SetAbortExecuteAndUpdateTime()`` stops the work, also from before the update or in an
-    algorithm upstream: Python's ``Update`` raises ``Cancelled`` then, an update that VTK asks for
-    gives an empty image. What had been made before stays, and the next update begins anew: an
-    abort is of one execution.
+    ``ProgressEvent`` is invoked while it works, and ``SetAbortExecute(1)`` in it stops the work:
+    Python's ``Update`` raises ``Cancelled`` then, an update that VTK asks for gives an empty image.
+    What had been made before stays, and the next update begins anew.
     """
 
     bad_input = InvalidVolumeError
 
+    SetWindowSize, GetWindowSize = accessors(
+        "window_size",
+        "the screen's width and height in pixels, as two numbers or one pair",
+        check=checked_size,
+    )
+    SetCoverage, GetCoverage = accessors(
+        "coverage",
+        "what the VDI covers: its window, ``'view'``, or ``'bounds'``, the smallest rectangle of "
+        "the screen's pixel grid that contains the whole volume (where the eye is inside its "
+        "bounds, or they reach behind it, a ``VDIWarning`` is given and the window is used)",
+        "view",
+        partial(one_of, name="coverage", names=("bounds", "view")),
+    )
+    SetOptions, GetOptions = accessors(
+        "options",
+        "how the VDI is made, all of it at once; lights are set by ``SetLights``",
+        GenerationOptions(),
+        checked_options,
+    )
+    SetDial, GetDial = accessors(
+        "target",
+        "what the VDI is to reach, by the arguments of ``QualityTarget``; without any, nothing. It "
+        "chooses the lists of the window, ``MaxSupersegments`` and ``Precision``, which have to "
+        "have their defaults, as ``Tolerance`` has to; ``GetVDI().metadata['dial']`` says what",
+        check=lambda *given, **named: QualityTarget(*given, **named) or None,
+    )
+    SetDeferral, GetDeferral = accessors(
+        "deferral",
+        "when scalars are classified, by the arguments of ``Deferral``; without any, as the VDI is "
+        "made. ``'deferred'`` makes a ``DeferredVDI``: of the volume property, which may be left "
+        "out, only the interpolation counts then",
+        Deferral(),
+        checked_deferral,
+    )
+    SetDevice, GetDevice = accessors("device", "the OpenCL device; ``None`` is the default one")
+    SetMetadata, GetMetadata = accessors(
+        "metadata", "entries to add to the VDI's metadata", {}, dict
+    )
+    SetProgressCallback, GetProgressCallback = accessors(
+        "progress", "a callable that gets the fraction done; if it returns ``False`` the work stops"
+    )
+
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(
+            # Any data object, so that what is no image is refused by name: for a required image
+            # VTK would go through a composite data set block by block
+            nInputPorts=1,
+            inputType="vtkDataObject",
+            nOutputPorts=1,
+            outputType="vtkImageData",
+        )
+        self._camera: Camera | None = None
+        self._lights = Lights()  # of the renderer, as they were read last
+        self._lit_by = vtkWeakReference()
+        self._placed: Any = None  # rows of the actor's matrix
         self._volume: Volume | None = None
         self._volume_key: Any = None
         self._table: TransferFunction | None = None
         self._table_key: Any = None
         self._vdi: VDI | None = None
         self._request: Request | None = None
-        self.AddObserver("EndEvent", _end_abort)
         self.inputs: weakref.WeakSet[Any] = weakref.WeakSet()  # mappers' inputs that draw this
+
+    # What is set
+
+    def SetScalars(self, name: str | None, preference: str = "point") -> None:
+        """Choose the array by name; ``None`` means the active scalars.
+
+        ``preference``: which is taken where points and cells have one of that name.
+        """
+        one_of(preference, name="preference", names=("point", "cell"))
+        self._change("scalars", name)
+        self._change("preference", preference, "point")
+
+    _, GetScalars = accessors("scalars", "the array's name, or ``None`` for the active scalars")
+    _, GetPreference = accessors("preference", "whether points or cells come first", "point")
+
+    def SetCamera(
+        self, camera: CameraLike | None, model_transform: ArrayLike | None = None
+    ) -> None:
+        """Set the generating view V_O.
+
+        Parameters
+        ----------
+        camera : vtkCamera or pyvista.Camera or Camera or None
+            A copy counts. ``None`` waits for the first frame of a mapper.
+        model_transform : array_like, shape (4, 4), optional
+            Where the volume stands in that view's world: the actor's matrix.
+
+        Raises
+        ------
+        InvalidCameraError, UnsupportedError
+            If it is no camera, or has what the optical model has no place for.
+        """
+        require_this_build(type(camera))
+        view = None if camera is None else camera_of(camera, model_transform)
+        if view != self._camera:
+            self._camera = view
+            self.Modified()
+
+    def GetCamera(self) -> Camera | None:
+        """Return the generating view on the screen, before coverage widens it."""
+        return self._camera
+
+    def SetLights(self, lights: LightsLike | None) -> None:
+        """Set what a shaded volume is lit by.
+
+        Parameters
+        ----------
+        lights : None, vtkRenderer, Lights or iterable of vtkLight, pyvista.Light or Light
+            ``None``, the default, is one headlight. A renderer's lights are looked at whenever
+            the VDI is asked for, and other lights make another VDI; lights that merely follow the
+            camera do not. What is given as a list is copied now.
+        """
+        renderer = lights if hasattr(lights, "GetTwoSidedLighting") else None
+        require_this_build(type(renderer))
+        self._lit_by.Set(renderer)
+        self._take_lights(Lights.from_any(lights))
+
+    def GetLights(self) -> Lights:
+        """Return what a shaded volume is lit by; of a renderer, as its lights are now."""
+        renderer = self._lit_by.Get()
+        if renderer is not None:
+            self._take_lights(Lights.from_any(renderer))
+        return self._lights
+
+    def CheckLights(self) -> None:
+        """Be out of date if a shaded volume's renderer has other lights by now."""
+        if self._is_shaded():
+            self.GetLights()
+
+    def _take_lights(self, lights: Lights) -> None:
+        if lights != self._lights:
+            self._lights = lights
+            if self._is_shaded():
+                self.Modified()
+
+    def GetLitBy(self) -> Any:
+        """Return the renderer whose lights are looked at; ``None`` where there is none."""
+        return self._lit_by.Get()
+
+    def SetLitBy(self, renderer: Any) -> None:
+        """Look at the lights of another renderer; ``None`` leaves them as they were read last."""
+        self._lit_by.Set(renderer)
+
+    def SetPlace(self, model_transform: ArrayLike) -> None:
+        """Note the matrix, (4, 4), of the actor that the volume is shown by.
+
+        Where lights of the scene shine on a shaded volume, another place makes another VDI, which
+        is lit there.
+        """
+        placed = tuple(map(tuple, np.asarray(model_transform).tolist()))
+        if placed != self._placed:
+            self._placed = placed
+            if self._is_shaded() and self._lights.of_scene:
+                self.Modified()
+
+    def _is_shaded(self) -> bool:
+        prop = self.GetVolumeProperty()
+        return prop is not None and bool(prop.GetShade())
+
+    # What is made
 
     def Update(self, *args: Any) -> None:
         """Bring the output up to date, and raise what went wrong."""
         self.CheckLights()
-        self._check_input()
+        connected = self.GetNumberOfInputConnections(0) > 0
+        data = self.GetInputDataObject(0, 0) if connected else None
+        # Somebody may have brought the input to another time, and this asks for none: VTK's filters
+        # look at the data of their input only when they have reason to execute
+        known = isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0
+        if known and self._request and wanted_time(self.GetOutputInformation(0)) is None:
+            before = self._request.volume
+            if self._read(data) is not before:
+                self.Modified()
         super().Update(*args)
-
-    def _check_input(self) -> None:
-        """Be out of date if somebody has brought the input to another time, and this asks for none.
-
-        VTK's filters look at the data of their input only when they have reason to execute.
-        """
-        if self._request is None or self.GetNumberOfInputConnections(0) == 0:
-            return
-        data = self.GetInputDataObject(0, 0)
-        if (
-            wanted_time(self.GetOutputInformation(0)) is None
-            and isinstance(data, vtkImageData)
-            and data.GetNumberOfPoints() > 0
-            and self._read(data) is not self._request.volume
-        ):
-            self.Modified()
 
     def GetVDI(self) -> VDI:
         """Return the VDI, brought up to date; a ``DeferredVDI`` if :meth:`SetDeferral` says so.
@@ -169,10 +343,6 @@ class VDISource(SourceSettings):
         """Return the VDI made last, whether up to date or not."""
         return self._vdi
 
-    def GetCurrentVolume(self) -> Volume | None:
-        """Return the volume read last, whether up to date or not."""
-        return self._volume
-
     def GetCurrentRequest(self) -> Request | None:
         """Return what the VDI made last was made of."""
         return self._request
@@ -183,18 +353,12 @@ class VDISource(SourceSettings):
         This brings the pipeline before the source up to date, and generates nothing; it raises what
         :meth:`GetVDI` would raise before it generates.
         """
-        if self._deferral.deferred:
+        if self.GetDeferral().deferred:
             raise UnsupportedError(
                 "this VDISource keeps values, and a mapper draws colours: give add_vdi or "
                 "VDIToImage what it makes, or VDIMapper GetVDI().classified(cmap=..., opacity=...)"
             )
-        data = self.UpdateInput()
-        return self._make_request(
-            data,
-            self.GetCamera() if view is None else view.camera,
-            self._window_size if view is None else view.size,
-            warn=False,
-        )
+        return self._make_request(self.UpdateInput(), view, warn=False)
 
     def TakeVDI(self, vdi: VDI, request: Request, *, view: bool = True) -> None:
         """Take a VDI that was made of a request elsewhere, as if it had been made here.
@@ -202,15 +366,18 @@ class VDISource(SourceSettings):
         ``view``: its view becomes that of the VDIs to come.
         """
         if view:
-            self._window_size = request.screen.size
-        if view and not (self._track and self._given is not None):  # which goes on to be followed
-            self._camera = request.screen.camera
+            self._set["window_size"], self._camera = request.screen.size, request.screen.camera
         self._vdi, self._request = vdi, request
         self.Modified()  # the output is another
 
     def MakeVDI(self, request: Request) -> VDI:
         """Return the VDI of a request, made now; what the source has made stays."""
-        return self._generate(request)
+        asked = request.generation.replace(progress=self._advance)
+        if request.deferral.deferred:
+            return generate_deferred(asked, request.deferral)  # type: ignore[return-value]
+        if request.target is None:
+            return generate_vdi(asked)
+        return generate_to_target(asked, request.target)
 
     def GetVolume(self) -> Volume:
         """Return the volume at the input, read again only if it has changed; raises if none is."""
@@ -222,15 +389,13 @@ class VDISource(SourceSettings):
         The volume and its property are shared; what is set of one is not set of the other.
         """
         other = VDISource()
-        other.TakeSettings(self)
         other.SetInputConnection(self.GetInputConnection(0, 0))
-        other._volume, other._volume_key = self._volume, self._volume_key
-        other._vdi, other._request = self._vdi, self._request
+        other.SetVolumeProperty(self.GetVolumeProperty())
+        other.SetLitBy(self.GetLitBy())
+        for name in ("camera", "lights", "placed", "volume", "volume_key", "vdi", "request"):
+            setattr(other, f"_{name}", getattr(self, f"_{name}"))
+        other._set = dict(self._set)
         return other
-
-    def NewInstance(self) -> VDISource:
-        """Return another source of this class, with no input and no settings."""
-        return type(self)()
 
     def UpdateInput(self) -> Any:
         """Return the data at the input, up to date and as of the time that is asked of the source.
@@ -241,95 +406,48 @@ class VDISource(SourceSettings):
             If there is no input.
         """
         if self.GetNumberOfInputConnections(0) == 0:
-            raise InvalidVolumeError(self._no_input())
+            raise InvalidVolumeError("VDISource has no input: call SetInputDataObject")
         time = wanted_time(self.GetOutputInformation(0))
         if time is not None:  # else what others asked for is as good
             self.GetInputInformation(0, 0).Set(UPDATE_TIME_STEP, time)
         self.GetInputAlgorithm(0, 0).Update()
         return self.GetInputDataObject(0, 0)
 
-    def GetInputBounds(self) -> tuple[float, ...] | None:
-        """Return the volume's bounds, model frame; ``None`` where there is no volume.
-
-        The input is brought up to date, as by VTK's mappers, because many filters announce other
-        bounds than they give; no VDI is made.
-        """
-        if self.GetNumberOfInputConnections(0) == 0:
-            return None
-        data = self.UpdateInput()
-        if isinstance(data, vtkImageData):
-            return tuple(data.GetBounds()) if data.GetNumberOfPoints() else None
-        return self._known_bounds()
-
-    def _known_bounds(self) -> tuple[float, ...] | None:
-        """Return the volume's bounds, as far as they are known without reading it."""
-        image = self._input_grid()
-        return None if image is None else tuple(image.GetBounds())
-
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Announce the output's extent: one point per list."""
-        width, height = 1, 1
-        grid = self._input_grid()
-        try:
-            camera = self.GetCamera()
-        except VDIError:
-            camera = None  # RequestData says what is wrong with it
-        if grid is not None and camera is not None and self._window_size is not None:
-            _, (width, height) = self._view(grid, camera, self._window_size, warn=False)
-        self.picture_size = self._window_size or (width, height)
-        announce(outputs, (width, height))
-        return 1
-
-    def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
-        """Generate, unless nothing that matters has changed."""
-        super().RequestData(request, inputs, outputs)
-        if self._error is not None:  # aborted, the next update tries again
-            self.SetAbortOutput(isinstance(self._error, Cancelled))
+        """Announce the output's extent: one point per list, as far as it is known before."""
+        self.picture_size = self.GetWindowSize() or (1, 1)
+        made = self._request
+        announce(outputs, self.picture_size if made is None else made.generating[1])
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
-        if self._aborted():
-            raise Cancelled("generating a VDI was aborted before it began")
-        image = vtkDataObject.GetData(inputs[0], 0)
-        request = self._make_request(image, self.GetCamera(), self._window_size, warn=True)
+        self.SetAbortExecute(0)  # of this execution nobody has said it yet
+        request = self._make_request(vtkDataObject.GetData(inputs[0], 0), None, warn=True)
         if self._vdi is None or self._request is None or request.key != self._request.key:
-            self._vdi = self._generate(request)
+            self._vdi = self.MakeVDI(request)
             self._request = request
             if request.target is not None:
                 warn_missed(self._vdi)
         vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(self._vdi))
-        # A dial has chosen it only now, and a volume's bounds may change with time
+        # Coverage and a dial have chosen it only now
         announce(outputs, self._vdi.window_size)
         ask_for_all([outputs])
 
-    def _generate(self, request: Request) -> VDI:
-        asked = request.generation.replace(progress=self._advance)
-        if request.deferral.deferred:
-            return generate_deferred(asked, request.deferral)  # type: ignore[return-value]
-        if request.target is None:
-            return generate_vdi(asked)
-        return generate_to_target(asked, request.target)
-
-    def _make_request(
-        self,
-        image: Any,
-        camera: Camera | None,
-        window_size: tuple[int, int] | None,
-        *,
-        warn: bool,
-    ) -> Request:
-        prop = self.GetVolumeProperty()
+    def _make_request(self, image: Any, view: View | None, *, warn: bool) -> Request:
+        prop, deferral, target = self.GetVolumeProperty(), self.GetDeferral(), self.GetDial()
+        camera = self._camera if view is None else view.camera
+        window_size = self.GetWindowSize() if view is None else view.size
         needed = {
             "camera (SetCamera)": camera,
             "window size (SetWindowSize)": window_size,
-            "volume property (SetVolumeProperty)": prop or self._deferral.deferred or None,
+            "volume property (SetVolumeProperty)": prop or deferral.deferred or None,
         }
         missing = [what for what, value in needed.items() if value is None]
         if camera is None or window_size is None or missing:
             raise InvalidArgumentError(f"VDISource has no {', no '.join(missing)}")
         volume = self._read(image)
-        if prop is None or self._deferral.deferred:
-            self._deferral.refuse_target(self._target or QualityTarget())
+        if prop is None or deferral.deferred:
+            deferral.refuse_target(target or QualityTarget())
             table = _unclassified(prop)
         else:
             # Take the property's functions over the volume's scalars, the same until they change
@@ -339,98 +457,49 @@ class VDISource(SourceSettings):
                 self._table_key = key
             table = self._table
         lights = self.GetLights() if table.shading else Lights()
-        options = replace(self._options, lights=lights)
+        options = replace(self.GetOptions(), lights=lights)
         # Where lights of the scene shine on it, the volume is lit where it stands now
         placed = self._placed if lights.of_scene else None
         screen = View(camera, window_size)
+        generating = (camera, window_size)
         if placed is not None:
-            camera = camera.replace(model_transform=placed)
-        return Request(
-            volume,
-            table,
-            screen,
-            self._view(image, camera, window_size, warn=warn),
-            options,
-            self._deferral,
-            self._target,
-            self._device,
-            {"scalars": volume.name, **self._metadata},
-            (
-                *(self._volume_key, table, options, placed, self._deferral),
-                *(self._target, self._device, self._metadata),
-            ),
-        )
-
-    def _read(self, image: Any) -> Volume:
-        """Return the volume; the same object as long as it is the same (it is on the device)."""
-        if image is None:
-            raise InvalidVolumeError("what is before VDISource gives no data: check its input")
-        image = require_image(image)
-        array = scalars_of(image, self._scalars, self._preference)
-        # The image's time is newer than its arrays', whose values may have been written in place
-        key = (array.GetAddressAsString(""), image.GetMTime())
-        if self._volume is None or key != self._volume_key:
-            if is_aborted(self.GetInputAlgorithm(0, 0)):
-                raise Cancelled("what is before VDISource was aborted: its data are not whole")
-            self._volume = volume_from_vtk(image, self._scalars, self._preference)
-            self._volume_key = key
-        return self._volume
-
-    def _view(
-        self, grid: vtkImageData, camera: Camera, window_size: tuple[int, int], *, warn: bool
-    ) -> tuple[Camera, tuple[int, int]]:
-        """Return the generating view and its window, after coverage."""
-        if self._coverage == "bounds":
+            generating = (camera.replace(model_transform=placed), window_size)
+        if self.GetCoverage() == "bounds":
             # The corners of the box of points, model frame: tighter than bounds if rotated
             corners = np.zeros((8, 3))
-            for at, corner in zip(bounds_corners(grid.GetExtent()).tolist(), corners, strict=True):
-                grid.TransformIndexToPhysicalPoint(*map(int, at), corner)
-            wide = covering_view(camera, window_size, corners)
-            if wide is not None:
-                return wide
-            if warn:
+            for at, corner in zip(bounds_corners(image.GetExtent()).tolist(), corners, strict=True):
+                image.TransformIndexToPhysicalPoint(*map(int, at), corner)
+            wide = covering_view(*generating, corners)
+            generating = wide or generating
+            if warn and wide is None:
                 warn_external(
                     "coverage='bounds' needs the eye outside the volume, with all of it in "
                     "front: the VDI covers the current view only (coverage='view'); move the "
                     "camera back and regenerate for the whole volume"
                 )
-        return camera, window_size
+        metadata, device = self.GetMetadata(), self.GetDevice()
+        content = (self._volume_key, table, options, placed, deferral, target, device, metadata)
+        metadata = {"scalars": volume.name, **metadata}
+        settings = (options, deferral, target, device, metadata, content)
+        return Request(volume, table, screen, generating, *settings)
 
-    def _input_grid(self) -> vtkImageData | None:
-        """Return the input's geometry, without reading its data."""
-        if self.GetNumberOfInputConnections(0) == 0:
-            return None
-        producer = self.GetInputAlgorithm(0, 0)
-        producer.UpdateInformation()
-        information = self.GetInputInformation(0, 0)
-        extent = whole_extent(information)
-        grid = vtkImageData()
-        data = self.GetInputDataObject(0, 0)
-        if data is not None and not isinstance(data, vtkImageData):
-            return None
-        if data is not None and data.GetNumberOfPoints() > 0:
-            grid.CopyStructure(data)
-            return grid
-        if extent is None:
-            return None
-        grid.SetExtent(extent)
-        for key, put in (
-            (vtkImageData.SPACING(), grid.SetSpacing),
-            (vtkImageData.ORIGIN(), grid.SetOrigin),
-            (vtkImageData.DIRECTION(), grid.SetDirectionMatrix),
-        ):
-            if information.Has(key):
-                put(information.Get(key))
-        return grid
+    def _read(self, image: Any) -> Volume:
+        """Return the volume; the same object as long as it is the same (it is on the device)."""
+        if image is None:
+            raise InvalidVolumeError("what is before VDISource gives no data: check its input")
+        image, chosen = require_image(image), (self.GetScalars(), self.GetPreference())
+        array = scalars_of(image, *chosen)
+        # The image's time is newer than its arrays', whose values may have been written in place
+        key = (array.GetAddressAsString(""), image.GetMTime())
+        if self._volume is None or key != self._volume_key:
+            self._volume, self._volume_key = volume_from_vtk(image, *chosen), key
+        return self._volume
 
     def _advance(self, fraction: float) -> bool:
         self.UpdateProgress(fraction)
-        going_on = self._progress is None or self._progress(fraction) is not False
-        return going_on and not self._aborted()
-
-    def _aborted(self) -> bool:
-        """Whether this algorithm, or one before it, is to stop."""
-        return bool(self.GetAbortExecute() or self.CheckAbort())
+        progress = self.GetProgressCallback()
+        goes_on = progress is None or progress(fraction) is not False
+        return goes_on and not self.GetAbortExecute()
 
 
 def _unclassified(prop: Any) -> TransferFunction:
@@ -444,13 +513,3 @@ def _unclassified(prop: Any) -> TransferFunction:
             "alone: call ShadeOff(), or leave classification='deferred' out"
         )
     return unclassified(INTERPOLATION[prop.GetInterpolationType()])
-
-
-def _end_abort(source: Any, event: str) -> None:
-    """Take back an abort that has been obeyed: it is of one execution.
-
-    Not before the end, or VTK would report the work as finished, and whoever aborts in each
-    ``ProgressEvent`` would do it again.
-    """
-    if source.GetAbortOutput():
-        source.SetAbortExecute(0)

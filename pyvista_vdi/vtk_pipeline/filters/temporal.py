@@ -7,7 +7,7 @@ from threading import Lock
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.vtk_pipeline.filters.algorithm import announced_times
+from pyvista_vdi.vtk_pipeline.filters.algorithm import TIME_STEPS
 from pyvista_vdi.vtk_pipeline.vtk import vtkCompositeDataSet, vtkImageData
 
 
@@ -22,7 +22,8 @@ def steps_and_times(source: Any) -> tuple[Sequence[Any], tuple[float, ...]]:
         times = tuple(source.time_values)
     else:
         source.UpdateInformation()
-        times = announced_times(source.GetOutputInformation(0))
+        information = source.GetOutputInformation(0)
+        times = tuple(information.Get(TIME_STEPS) or ()) if information.Has(TIME_STEPS) else ()
 
     def read(i: int) -> Any:
         if of_pyvista:

@@ -1,8 +1,8 @@
-"""The view that a renderer shows, and a camera whose views are followed."""
+"""VTK's cameras, and the view that a renderer shows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.view import View as View
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Held
-from pyvista_vdi.vtk_pipeline.vtk import vtkCamera, vtkMatrix4x4, vtkRenderer, weakly
+from pyvista_vdi.vtk_pipeline.vtk import vtkCamera, vtkMatrix4x4, vtkRenderer
 
 #: Largest departure of a rotation from one, by rounding of its matrix.
 _RIGID = 1e-9
@@ -92,72 +91,3 @@ def size_of(renderer: Any) -> tuple[int, int]:
     """Return width and height of a renderer's picture in pixels, at least 1."""
     width, height = renderer.GetSize()
     return max(1, width), max(1, height)
-
-
-class TrackedCamera:
-    """A ``vtkCamera`` that a :class:`VDISource` follows, and whether it has moved since.
-
-    The camera is kept, and the source is held weakly. ``model_transform``, (4, 4), says where the
-    volume stands in the camera's world.
-    """
-
-    def __init__(self, camera: Any, model_transform: ArrayLike | None, source: Any) -> None:
-        self._held = Held(camera)
-        self.model_transform = model_transform
-        self._pose = _pose(camera)
-        self._source = weakly(source)
-        self._tag: int | None = None
-
-    @property
-    def camera(self) -> Any:
-        """The ``vtkCamera``."""
-        return self._held.get()
-
-    def watch(self, moved: Callable[[Any], None] | None) -> None:
-        """Call ``moved(source)`` whenever the camera has moved; ``None`` ends it."""
-        if self._tag is not None:
-            self.camera.RemoveObserver(self._tag)
-            self._tag = None
-        if moved is None:
-            return
-        weak, seen = self._source, [_pose(self.camera)]
-
-        def changed(camera: Any, _: str) -> None:
-            pose, source = _pose(camera), weak()
-            # Renderers modify their cameras in every frame, by the clipping range
-            if source is not None and pose != seen[0]:
-                seen[0] = pose
-                moved(source)
-
-        self._tag = self.camera.AddObserver("ModifiedEvent", changed)
-
-    @property
-    def has_moved(self) -> bool:
-        """Whether it stands elsewhere than it did when it was read."""
-        return _pose(self.camera) != self._pose
-
-    def read(self) -> Camera:
-        """Return the view as it is now; raises what :meth:`Camera.from_any` does."""
-        view = camera_of(self.camera, self.model_transform)
-        self._pose = _pose(self.camera)
-        return view
-
-
-def _pose(camera: Any) -> tuple[Any, ...]:
-    """Return everything that makes another view; not checked, a camera on its way may be none."""
-    transform = camera.GetUserViewTransform()
-    return (
-        camera.GetPosition(),
-        camera.GetFocalPoint(),
-        camera.GetViewUp(),
-        camera.GetViewAngle(),
-        camera.GetUseHorizontalViewAngle(),
-        camera.GetParallelProjection(),
-        camera.GetParallelScale(),
-        camera.GetWindowCenter(),
-        camera.GetViewShear(),
-        camera.GetUseOffAxisProjection(),
-        camera.GetUseExplicitProjectionTransformMatrix(),
-        as_array(camera.GetModelTransformMatrix()).tobytes(),
-        0 if transform is None else transform.GetMTime(),
-    )

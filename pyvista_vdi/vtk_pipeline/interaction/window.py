@@ -99,6 +99,24 @@ class ShownVolume(NamedTuple):
         return as_array(placed)
 
 
+class Forgetting:
+    """An observer that has volumes forgotten, which it does not keep alive.
+
+    No function: VTK calls observers while the garbage collector deletes lists of props, and a
+    function whose closure the collector has cleared before crashes.
+    """
+
+    shown: Any = staticmethod(lambda: None)  # once the collector has cleared the object's own
+
+    def __init__(self, shown: ShownVolumes) -> None:
+        self.shown = weakref.ref(shown)
+
+    def __call__(self, *_: Any) -> None:
+        shown = self.shown()
+        if shown is not None:
+            shown.forget()
+
+
 class ShownVolumes:
     """The volumes of a renderer, those in assemblies too, in its order.
 
@@ -115,14 +133,8 @@ class ShownVolumes:
     def __call__(self) -> list[ShownVolume]:
         """Return them."""
         if self._volumes is None:
-            self._volumes, weak = [], weakref.ref(self)
-
-            def changed(*_: Any) -> None:
-                shown = weak()
-                if shown is not None:
-                    shown.forget()
-
-            self._look(self.renderer().GetViewProps(), (), changed)
+            self._volumes = []
+            self._look(self.renderer().GetViewProps(), (), Forgetting(self))
         return self._volumes
 
     def _look(self, props: Any, assemblies: tuple[Any, ...], changed: Callable[..., None]) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from drawing import generate_in_blocks, generate_vdi
 from PIL import Image
-from support import moving_field
 from support.march_ways import VIEWS, WINDOW, ray_depths, transfer_for, volume_of
 
 import pyvista_vdi as pvdi
@@ -70,11 +69,8 @@ def test_four_ranks_make_the_vdi_of_the_same_blocks_and_all_say_what_fails(
 
 
 @needs_mpi
-@pytest.mark.parametrize("part", ["mistakes", pytest.param("all_mistakes", marks=pytest.mark.slow)])
-def test_whatever_one_rank_is_given_all_raise_the_same_or_none_does(
-    part, tmp_path, default_runtime
-):
-    run(2, PROGRAM, part, tmp_path)
+def test_whatever_one_rank_is_given_all_raise_the_same_or_none_does(tmp_path, default_runtime):
+    run(2, PROGRAM, "mistakes", tmp_path)
 
 
 @pytest.mark.slow
@@ -84,29 +80,6 @@ def test_a_simulation_writes_a_series(tmp_path):
     series = pvdi.read(tmp_path / "run.vdis")
     assert list(series.times) == [0.0, 1.0]
     assert all(vdi.n_supersegments > 1000 for vdi in series)
-
-
-@needs_mpi
-@pytest.mark.slow
-def test_a_look_is_chosen_after_the_run(tmp_path):
-    """25 steps of four ranks, and three transfer functions that the run did not know."""
-    pytest.importorskip("pyvista")
-    run(4, PROGRAM, "deferred", tmp_path)
-    series, size = pvdi.read(tmp_path / "kept.vdis"), moving_field.SIZE
-    assert len(series) == moving_field.STEPS
-    assert series[0].metadata["blocks"] == [4, 1, 1]
-    for look in moving_field.LOOKS.values():
-        shown = series.classified(**look)
-        for step in (0, 12, 24):
-            volume = pvdi.Volume(moving_field.values_at(step), **moving_field.GRID)
-            look = {**look, "interpolation": "linear"}
-            baked = pvdi.generate(volume, series.camera, size, precision="8-byte", **look)
-            for degrees, least, lost in ((0, 0.996, 0.001), (5, 0.985, 0.003), (30, 0.985, 0.003)):
-                view = turned(series.camera, volume.bounds, degrees)
-                target = pvdi.render_volume(volume, view, size, **look)
-                found = compare_images(pvdi.render(shown[step], view), target).ssim
-                assert found >= least
-                assert found >= compare_images(pvdi.render(baked, view), target).ssim - lost
 
 
 @needs_mpi
@@ -155,14 +128,6 @@ def simulate(path, scene, times, comm=None, **options):
     return show
 
 
-def test_one_rank_is_one_piece(tmp_path, scene):
-    simulate(tmp_path / "run.vdis", scene, [0.0], precision="exact")
-    (found,) = pvdi.read(tmp_path / "run.vdis")
-    expected = pvdi.generate(*scene, clim=(0, 200), max_supersegments=4)
-    assert found.n_supersegments == expected.n_supersegments
-    np.testing.assert_array_equal(found.front, expected.front)
-
-
 def test_one_rank_keeps_the_values_of_one_piece(tmp_path, scene):
     options = {"classification": "deferred", "value_range": (20, 200), "interpolation": "linear"}
     options |= {"max_supersegments": 4, "precision": "exact"}
@@ -180,11 +145,6 @@ def test_one_rank_keeps_the_values_of_one_piece(tmp_path, scene):
     ):
         with pytest.raises(error, match=says):
             simulate(tmp_path / "other.vdis", scene, [0.0], **{**options, "clim": None, **wrong})
-
-
-def test_a_series_has_the_precision_that_is_asked_for(tmp_path, scene):
-    simulate(tmp_path / "RUN.VDIS", scene, [0.0])
-    assert pvdi.read(tmp_path / "RUN.VDIS")[0].precision == "8-byte"
 
 
 def test_a_step_that_cannot_be_written_is_told_to_all_ranks(tmp_path, scene):
@@ -235,7 +195,7 @@ def test_what_an_earlier_run_wrote_is_kept_or_continued(tmp_path, scene):
         ("s{:02d}.vdi", (8, 8, 8), {"clim": (0, 1)}, VDIFileError, "must end in .vdis"),
         *(
             ("x.vdis", (8, 8, 8), {"clim": (0, 1), "every": every}, InvalidArgumentError, "every")
-            for every in (0, "often", "2", 2.5, None, True)
+            for every in (0, "often")
         ),
         ("x.vdis", (8, 8), {"clim": (0, 1)}, InvalidArgumentError, "three whole numbers"),
         ("x.vdis", (8, 8, 8), {"clim": (0, 1), "colour": "red"}, TypeError, "colour"),

@@ -18,14 +18,13 @@ from distributed import Client, LocalCluster
 from drawing import generate_in_blocks
 from support.march_ways import VIEWS, WINDOW, transfer_for, volume_of
 
-from pyvista_vdi import Volume, generate, open_volume
+from pyvista_vdi import Volume, generate, read_volume
 from pyvista_vdi.errors import (
     Cancelled,
     DeviceError,
     InvalidArgumentError,
     InvalidArgumentTypeError,
     InvalidVolumeError,
-    NoDeviceError,
 )
 
 #: Seconds within which a worker starts on the busiest machine; more is a worker that never does.
@@ -74,13 +73,6 @@ def test_whoever_makes_it_the_bytes_are_the_same(client, scene, expected):
     assert told[-1] == pytest.approx(1)
 
 
-def test_what_is_out_of_sight_is_empty(client, scene):
-    volume, camera, *rest = scene[0]
-    away = camera.replace(focal_point=tuple(2 * np.array(camera.position) - camera.focal_point))
-    found = generate_in_blocks(volume, away, *rest, client=client)
-    assert found.n_supersegments == 0
-
-
 def test_values_are_the_same_by_workers(client, scene, default_runtime):
     volume, camera, size, _ = scene[0]
     options = {"classification": "deferred", "value_range": (20, 200), "max_supersegments": 8}
@@ -109,21 +101,11 @@ def kill_once(pid, fraction):
     return progress
 
 
-@pytest.mark.parametrize(
-    "fraction",
-    [
-        0.3,
-        *(
-            pytest.param(round(at, 2), marks=pytest.mark.slow)
-            for at in np.random.default_rng(7).random(10)
-        ),
-    ],
-)
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes are killed by SIGKILL")
-def test_a_killed_worker_changes_nothing(client, scene, expected, fraction):
+def test_a_killed_worker_changes_nothing(client, scene, expected):
     arguments, options = scene
     client.wait_for_workers(2, timeout=STARTED)
-    progress = kill_once(lambda: min(client.run(os.getpid).values()), fraction)
+    progress = kill_once(lambda: min(client.run(os.getpid).values()), 0.3)
     found = generate_in_blocks(*arguments, client=client, progress=progress, **options)
     assert found.equals(expected)
     client.wait_for_workers(2, timeout=STARTED)
@@ -146,8 +128,7 @@ def _left(dask_scheduler):
 @pytest.mark.parametrize(
     ("given", "error", "message"),
     [
-        ("cluster", InvalidArgumentTypeError, r"a LocalCluster: give distributed.Client\(cluster"),
-        (7, InvalidArgumentTypeError, "an? int"),
+        ("cluster", InvalidArgumentTypeError, r"LocalCluster: give distributed.Client\(cluster"),
         ("tcp://127.0.0.1:1", InvalidArgumentError, "no Dask scheduler answers at 'tcp://127"),
     ],
 )
@@ -159,12 +140,6 @@ def test_what_is_no_client_is_refused(client, scene, given, error, message):
         pytest.raises(error, match=message),
     ):
         generate(volume, camera, size, transfer_function=function, client=wrong)
-
-
-def test_an_address_is_that_of_its_scheduler(client, scene, expected):
-    (volume, camera, size, function), options = scene
-    options = {**options, "transfer_function": function, "client": client.scheduler.address}
-    assert generate(volume, camera, size, **options).n_supersegments > 1000
 
 
 @pytest.mark.parametrize(
@@ -207,7 +182,6 @@ def hdf5_store(folder, values):
 
 STORES = {
     "zarr": zarr_store,
-    "zarr2": lambda *of: zarr_store(*of, zarr_format=2),
     "hdf5": hdf5_store,
 }
 
@@ -233,60 +207,12 @@ def in_folders(client, tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(not Path("/proc/self/cwd").exists(), reason="a path that differs by process")
-@pytest.mark.parametrize("kind", [*STORES, "dask"])
-@pytest.mark.parametrize(
-    ("where", "said"), [("none", "cannot be read there"), ("other", "another file")]
-)
-def test_a_worker_that_has_not_the_same_store_is_named(
-    client, scene, in_folders, where, said, kind
-):
+@pytest.mark.parametrize("kind", ["hdf5", "dask"])
+def test_a_worker_that_has_not_the_store_is_named(client, scene, in_folders, kind):
     (_, *rest), options = scene
-    array, here = volume_of("uint8").array, in_folders("here", where)
-    make = STORES["zarr" if kind == "dask" else kind]
-    make(here, array)
-    if where != "none":
-        make(here.parent / where, array // 2)
+    STORES["zarr" if kind == "dask" else kind](in_folders("here", "none"), volume_of("uint8").array)
     path = "/proc/self/cwd/s"  # as of a mount that is not the same on all machines
-    opened = Volume(da.from_zarr(path)) if kind == "dask" else open_volume(path)
+    opened = Volume(da.from_zarr(path)) if kind == "dask" else read_volume(path)
     bad = list(client.nthreads())[1]
-    with pytest.raises(InvalidVolumeError, match=rf"{bad}.*/s.*{said}"):
+    with pytest.raises(InvalidVolumeError, match=rf"{bad}.*/s.* cannot be read there"):
         generate_in_blocks(opened, *rest, client=client, **options)
-
-
-@pytest.mark.every(9)
-@pytest.mark.parametrize("kind", STORES)
-def test_relative_paths_are_this_process_s_and_changes_are_seen_while_it_is_open(
-    client, scene, in_folders, kind, default_runtime
-):
-    (_, *rest), options = scene
-    array, here = volume_of("uint8").array, in_folders("none", "none")
-    STORES[kind](here, array)
-    opened = open_volume("s")
-    whole = generate_in_blocks(opened, *rest, **options)
-    assert generate_in_blocks(opened, *rest, client=client, **options).equals(whole)
-    if kind == "hdf5":
-        del opened
-    changed = np.where(array > 100, 0, array)
-    STORES[kind](here, changed)
-    if kind == "hdf5":
-        opened = open_volume("s")
-    found = generate_in_blocks(opened, *rest, client=client, **options)
-    expected = generate_in_blocks(Volume(changed), *rest, chunks=(16, 16, 16), **options)
-    assert found.equals(expected)
-    assert not found.equals(whole)
-
-
-def test_a_worker_without_a_device_is_named(client, scene):
-    arguments, options = scene
-    worker = list(client.nthreads())[1]
-    before = os.environ.get("PYVISTA_VDI_DEVICE", "")
-
-    def choose(name):
-        client.run(lambda: os.environ.update(PYVISTA_VDI_DEVICE=name), workers=[worker])
-
-    try:
-        choose("nobody")
-        with pytest.raises(NoDeviceError, match=f"1 of 2 workers.*{worker}.*nobody"):
-            generate_in_blocks(*arguments, client=client, **options)
-    finally:
-        choose(before)

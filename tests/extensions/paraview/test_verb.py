@@ -6,11 +6,10 @@ import importlib.util
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from command_line import complaint, outcome, run
+from command_line import run
 
 from pyvista_vdi.extensions.paraview import cli as verb
 from pyvista_vdi.extensions.paraview.parts.client import require_one_process
@@ -32,11 +31,6 @@ def plain_installation(tmp_path, monkeypatch):
     return package
 
 
-def test_paraview_prints_the_plugins_path(capsys):
-    out = run(capsys, "paraview")
-    assert Path(out.strip()).is_file()
-
-
 def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
     out = run(capsys, "paraview", "--environment")
     shown = subprocess.run(
@@ -51,40 +45,6 @@ def test_paraview_prints_what_a_shell_evaluates(plain_installation, capsys):
         f"{site}:/before",
         f"{site}/pyvista_vdi/extensions/paraview/plugin",
     ]
-
-
-@pytest.mark.parametrize(
-    ("does", "message"),
-    [
-        ('echo "$PYTHONPATH:$PV_PLUGIN_PATH"', None),
-        ("exit 3", "loads the plugin, and finds no OpenCL device"),
-        ("exit 1", "does not load the plugin (status 1)"),
-    ],
-)
-def test_paraview_is_asked_whether_it_finds_a_device(
-    plain_installation, tmp_path, capfd, monkeypatch, does, message
-):
-    monkeypatch.setenv("PYTHONPATH", "/before")
-    monkeypatch.delenv("PV_PLUGIN_PATH", raising=False)
-    pvpython = tmp_path / "pvpython"
-    pvpython.write_text(f"#!/bin/sh\n{does}\n")
-    pvpython.chmod(0o755)
-    if message is None:
-        site = plain_installation.parent
-        expected = f"{site}:/before:{site}/pyvista_vdi/extensions/paraview/plugin\n"
-        assert outcome(capfd, "paraview", "--check", pvpython) == (0, expected, "")
-    else:
-        assert message in complaint(capfd, "paraview", "--check", pvpython)
-
-
-def test_paraview_is_not_shown_what_it_cannot_use(plain_installation, capsys):
-    assert "does not start" in complaint(capsys, "paraview", "--check", "/no/pvpython")
-    (plain_installation / "opencl" / "__init__.py").unlink()
-    assert "is an editable installation" in complaint(capsys, "paraview", "--environment")
-    (plain_installation / "opencl" / "__init__.py").touch()
-    (plain_installation.parent / "vtkmodules").mkdir()
-    message = complaint(capsys, "paraview", "--environment")
-    assert "holds a VTK of its own" in message
 
 
 def test_a_server_of_several_ranks_is_refused_when_the_plugin_is_loaded():

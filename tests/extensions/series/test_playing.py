@@ -7,12 +7,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import CLASSIFICATION, soft_ball, vdi_of_one_list
+from plugin_scenes import CLASSIFICATION, soft_ball
 from watched_windows import (
-    MOVING,
     WINDOW,
     frame,
-    frames_until,
     picture_of,
     small_vdi,
     threads,
@@ -61,25 +59,6 @@ def test_each_step_is_drawn_as_its_vdi(plotter, series):
     assert f"time {series.times[-2]:g}" in str(actor.status)
 
 
-def test_it_plays_while_the_camera_turns(plotter, series):
-    actor = shown(plotter, series)
-    actor.play(rate=200)
-    seen = set()
-
-    def all_seen():
-        plotter.camera.Azimuth(3)
-        seen.add(actor.step)
-        return len(seen) == N
-
-    frames_until(plotter, all_seen, rate=MOVING)
-    assert actor.playing
-    actor.pause()
-    step = actor.step
-    rest = frame(plotter)
-    assert (actor.step, actor.playing) == (step, False)
-    np.testing.assert_array_equal(rest, picture_of(series[step], plotter))
-
-
 def test_a_damaged_step_of_a_file_leaves_what_was_shown(plotter, series, tmp_path):
     path = tmp_path / "s.vdis"
     with pvdi.SeriesWriter(path) as out:
@@ -111,45 +90,16 @@ def test_another_series_keeps_the_time_and_copies_play_by_themselves(plotter, se
     assert not actor.playing
 
 
-def test_a_slider_sets_the_time_and_shows_that_of_the_step_drawn(plotter, series, tmp_path):
-    actor = shown(plotter, series)
-    slider = actor.add_time_slider(plotter, title="t / s")
-    bar = slider.GetRepresentation()
-    assert (bar.GetMinimumValue(), bar.GetMaximumValue(), bar.GetValue()) == (0.0, 0.75, 0.0)
-    bar.SetValue(0.52)
-    slider.InvokeEvent("InteractionEvent")
-    assert actor.time == 0.5
-    # It shows the step that is drawn: paused, in a film, and while it plays
-    plotter.render()
-    assert bar.GetValue() == 0.5
-    actor.step = 3
-    plotter.render()
-    assert bar.GetValue() == 0.75
-    plotter.open_gif(tmp_path / "film.gif")
-    for time in series.times:
-        actor.time = time
-        plotter.write_frame()
-        assert bar.GetValue() == time
-    plotter.mwriter.close()
-    actor.step = 2
-    actor.play(rate=200)
-    frames_until(plotter, lambda: actor.step != 2)
-    assert bar.GetValue() == actor.time
-
-
 def test_what_has_no_times_is_refused(plotter, series):
     actor = plotter.add_vdi(small_vdi())
-    for use in (actor.play, actor.pause, lambda: actor.time, lambda: setattr(actor, "step", 0)):
+    for use in (actor.play, lambda: actor.time, lambda: setattr(actor, "step", 0)):
         with pytest.raises(InvalidArgumentError, match="shows no series"):
             use()
-    assert actor.series is None
-    assert not actor.playing
-    one = plotter.add_vdi(pvdi.VDISeries([vdi_of_one_list()] * 2)[:1], show_scalar_bar=False)
+    one = plotter.add_vdi(series[:1], show_scalar_bar=False)
     for use, error, message in (
         (lambda: actor.mapper.SetSeries([1, 2]), InvalidArgumentError, "VDISeries"),
         (lambda: plotter.add_vdi(series, cmap="bone"), UnsupportedError, "cmap cannot be given"),
         (lambda: actor.mapper.SetVDI([series]), InvalidVDIError, "list"),
-        (lambda: one.add_time_slider(plotter), InvalidArgumentError, "one step"),
         (one.regenerate, InvalidArgumentError, "without a volume"),
     ):
         with pytest.raises(error, match=message):
@@ -159,10 +109,44 @@ def test_what_has_no_times_is_refused(plotter, series):
 def test_closing_while_it_plays_leaves_nothing(no_leaks, series):
     plotter = pv.Plotter(window_size=WINDOW)
     actor = shown(plotter, series)
-    actor.add_time_slider(plotter)
     actor.play()
     frame(plotter)
     plotter.close()
     assert not actor.playing
     assert not threads("series")
     del plotter, actor
+
+
+LOOK = {"cmap": "bone", "opacity": [0, 0.2, 0.9], "clim": (20, 220)}
+
+
+@pytest.fixture(scope="module")
+def saved(default_runtime, tmp_path_factory):
+    path = tmp_path_factory.mktemp("series") / "run.vdis"
+    camera = filling_camera((-1, 1, -1, 1, -1, 1), SIZE)
+    with pvdi.SeriesWriter(path, camera, SIZE, classification="deferred") as out:
+        for k in range(4):
+            ball = soft_ball(12)
+            ball["v"] = np.roll(ball["v"].reshape(12, 12, 12), k, axis=2).ravel()
+            out.append(ball, k / 4)
+    return path
+
+
+def test_steps_are_drawn_in_the_look_that_is_given_and_in_what_it_becomes(plotter, saved):
+    actor = plotter.add_vdi(str(saved), show_scalar_bar=False, regenerate="never", **LOOK)
+    actor.mapper.SetInteractiveOffScreen(True)
+    plotter.show(auto_close=False)
+    series = pvdi.read(saved)
+    for step in (0, 2):
+        actor.step = step
+        picture = frame(plotter)
+        of_one = picture_of(series[step].classified(**LOOK), plotter)
+        assert np.abs(picture - of_one).max() <= 1
+    values = actor.mapper.driver.input.deferred
+    assert values.equals(series[2])
+    actor.prop.GetScalarOpacity().AddPoint(60, 1.0)
+    changed = frame(plotter)
+    now = values.classified(volume_property=actor.prop)
+    assert np.abs(changed - picture_of(now, plotter)).max() <= 1
+    assert np.abs(changed - picture).max() > 8
+    assert actor.pick(60, 50).value > 0

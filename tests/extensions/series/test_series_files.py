@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import pickle
@@ -9,20 +10,16 @@ import signal
 import subprocess
 import sys
 import time
-import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 import stepped_vdis
-from stepped_vdis import SIZE, packed_steps, same, stepped_vdi
+from stepped_vdis import SIZE, packed_steps, same
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
-
-#: What a file of the format before this one begins with.
-EARLIER = b"\x89VDIS\r\n\x1a" + bytes(40)
 
 
 @pytest.fixture(scope="module")
@@ -56,50 +53,8 @@ def test_every_step_is_read_to_the_last_bit(steps, saved):
     assert same(series[1:3][1], steps[2])
     assert all_same(pickle.loads(pickle.dumps(series)), steps)
 
-    def look(seed):
-        chosen = np.random.default_rng(seed).integers(0, 5, 12).tolist()
-        return all(series[i].equals(steps[i]) for i in chosen)
-
     with ThreadPoolExecutor(4) as pool:
-        assert all(pool.map(look, range(4)))
-
-
-def test_a_step_is_a_vdi_file_and_a_file_is_the_folder_zipped(steps, saved, tmp_path):
-    if saved.is_file():
-        with zipfile.ZipFile(saved) as archive:
-            archive.extractall(tmp_path / "b.vdis")
-        saved = tmp_path / "b.vdis"
-    assert json.loads((saved / "series.json").read_text())["times"] == [0.0, 0.5, 1.0, 1.5, 2.0]
-    assert same(pvdi.read(saved / "000003.vdi"), steps[3])
-    assert all_same(pvdi.read(saved), steps)
-
-
-def test_views_windows_and_metadata_may_change_from_step_to_step(tmp_path):
-    first = stepped_vdi()
-    camera = pvdi.Camera((0, 1, 50), (0, 0, 0), (0, 1, 0))
-    empty = pvdi.VDI(camera, (3, 2), np.zeros(7, int), [], [], np.empty((0, 3)), [], first.bounds)
-    told = stepped_vdi(metadata={"told": [1.5, None]})
-    steps = [step.with_precision("8-byte") for step in (first, empty, told, first)]
-    assert all_same(pvdi.read(pvdi.VDISeries(steps).save(tmp_path / "a.vdis")), steps)
-
-
-def test_what_was_appended_is_readable_at_once(steps, tmp_path):
-    path = tmp_path / "a.vdis"
-    with pvdi.SeriesWriter(path) as out:
-        with pytest.raises(VDIFileError, match="no finished step"):
-            pvdi.read(path)
-        for k, vdi in enumerate(steps):
-            out.append(vdi, 10.0 + k)
-            series = pvdi.read(path)
-            assert (len(out), len(series)) == (k + 1, k + 1)
-            assert all_same(series, steps[: k + 1])
-        with pytest.raises(InvalidArgumentError, match="ascend"):
-            out.append(steps[0], 14.0)
-        with pytest.raises(InvalidArgumentError, match="camera and window_size"):
-            out.append(object(), 15.0)
-    assert pvdi.read(path).times == (10.0, 11.0, 12.0, 13.0, 14.0)
-    with pytest.raises(VDIFileError, match="closed"):
-        out.append(steps[0])
+        assert all(pool.map(lambda i: series[i].equals(steps[i]), [0, 4, 2, 1, 3] * 4))
 
 
 def content_of(folder):
@@ -111,28 +66,33 @@ def turned_away(vdi):
     return pvdi.VDI(vdi.camera.azimuth(3), vdi.window_size, *arrays, vdi.bounds)
 
 
-def test_a_series_is_continued_replaced_or_kept(steps, tmp_path):
+def test_what_was_appended_is_readable_at_once_and_continued_replaced_or_kept(steps, tmp_path):
     path = tmp_path / "a.vdis"
     with pvdi.SeriesWriter(path) as out:
-        for vdi in steps[:3]:
-            out.append(vdi)
+        with pytest.raises(VDIFileError, match="no finished step"):
+            pvdi.read(path)
+        for k, vdi in enumerate(steps[:3]):
+            out.append(vdi, 10.0 + k)
+            assert all_same(pvdi.read(path), steps[: k + 1])
+        with pytest.raises(InvalidArgumentError, match="camera and window_size"):
+            out.append(object(), 15.0)
+    with pytest.raises(VDIFileError, match="closed"):
+        out.append(steps[0])
     whole = content_of(path)
     with pytest.raises(VDIFileError, match=r"is there already with 3 .*append=True.*overwrite"):
         pvdi.SeriesWriter(path)
-    with pytest.raises(InvalidArgumentError, match="pass one of them"):
-        pvdi.SeriesWriter(path, append=True, overwrite=True)
     with pytest.raises(VDIFileError, match="it is a folder"):
         pvdi.VDISeries(steps).save(path)
     with pvdi.SeriesWriter(path, append=True) as out:
         assert len(out) == 3
-        with pytest.raises(InvalidArgumentError, match=r"ascend; got 2\.0 after 2\.0"):
-            out.append(steps[3], 2.0)
+        with pytest.raises(InvalidArgumentError, match=r"ascend; got 12\.0 after 12\.0"):
+            out.append(steps[3], 12.0)
         with pytest.raises(InvalidArgumentError, match="its camera is"):
-            out.append(turned_away(steps[3]))
+            out.append(turned_away(steps[3]), 13.0)
     assert content_of(path) == whole
     with pvdi.SeriesWriter(path, append=True) as out:
-        for vdi in steps[3:]:
-            out.append(vdi)
+        for k, vdi in enumerate(steps[3:]):
+            out.append(vdi, 13.0 + k)
     assert all_same(pvdi.read(path), steps)
     with pvdi.SeriesWriter(path, overwrite=True) as out:
         out.append(steps[0])
@@ -140,40 +100,24 @@ def test_a_series_is_continued_replaced_or_kept(steps, tmp_path):
     assert not (path / "000001.vdi").exists()
 
 
-@pytest.mark.parametrize(
-    ("content", "read"),
-    [(b"not a series", "not a series"), (b"", "not a series"), (EARLIER, "earlier format.*anew")],
-)
-def test_files_of_others_are_named_and_stay(content, read, steps, tmp_path):
+@pytest.mark.parametrize("content", [b"not a series", b""])
+def test_files_of_others_are_named_and_stay(content, steps, tmp_path):
     path = tmp_path / "a.vdis"
     path.write_bytes(content)
-    with pytest.raises(VDIFileError, match=read):
+    with pytest.raises(VDIFileError, match="no series of VDIs"):
         pvdi.read(path)
     for way in ({}, {"append": True}, {"overwrite": True}):
-        with pytest.raises(VDIFileError, match="is one file"):
+        with pytest.raises(VDIFileError, match="cannot be written"):
             pvdi.SeriesWriter(path, **way)
     with pytest.raises(VDIFileError, match="something else: choose another name"):
         pvdi.VDISeries(steps).save(path)
     assert path.read_bytes() == content
 
 
-def test_a_folder_that_has_lost_its_times_is_not_written_into(steps, tmp_path):
-    path = tmp_path / "a.vdis"
-    with pvdi.SeriesWriter(path) as out:
-        out.append(steps[0])
-    (path / "series.json").unlink()
-    whole = content_of(path)
-    for way, why in (({}, "is there already"), ({"append": True}, r"no series\.json")):
-        with pytest.raises(VDIFileError, match=why):
-            pvdi.SeriesWriter(path, **way)
-    assert content_of(path) == whole
-
-
 @pytest.mark.parametrize(
     ("change", "why"),
     [
         ({"version": 2}, "version 2.*upgrade"),
-        ({"format": "other"}, "format 'other'"),
         ({"times": [1, 1]}, "must ascend"),
         ({"times": None}, "incomplete"),
     ],
@@ -185,9 +129,6 @@ def test_times_that_cannot_be_are_refused(change, why, steps, tmp_path):
     head = json.loads((path / "series.json").read_text())
     (path / "series.json").write_text(json.dumps(head | change))
     with pytest.raises(VDIFileError, match=why):
-        pvdi.read(path)
-    (path / "series.json").write_text("[" * 100_000)
-    with pytest.raises(VDIFileError, match="damaged"):
         pvdi.read(path)
 
 
@@ -201,18 +142,10 @@ def test_a_file_that_is_cut_off_or_changed_is_noticed(tmp_path):
     random = np.random.default_rng(0)
     for place in random.integers(0, len(data), 60).tolist():
         path.write_bytes(data[:place] + bytes([data[place] ^ 0x10]) + data[place + 1 :])
-        try:
+        with contextlib.suppress(VDIFileError):
             series = pvdi.read(path)
-        except VDIFileError:
-            continue
-        right = 0
-        for i, step in enumerate(steps):
-            try:
-                assert series[i].equals(step)
-                right += 1
-            except VDIFileError as error:
-                assert f"{i:06}.vdi" in str(error)  # noqa: PT017 - most raise nothing
-        assert right >= len(steps) - 1
+            for i, step in enumerate(steps):
+                assert series[i].equals(step)  # or it raises
 
 
 def test_a_step_that_does_not_fit_is_not_counted(steps, tmp_path):

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import pyvista as pv
 from plugin_scenes import soft_ball
 from strategies import random_vdi
 from vtk_sources import ready_source, some_property
-from watched_windows import frame, frames_until
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
-from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, VDIWriter, vdi_from_image, vdi_to_image
+from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import SourceInput
-from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
 from pyvista_vdi.vtk_pipeline.vtk import (
     VTKPythonAlgorithmBase,
     vtkDataObject,
-    vtkExtractVOI,
     vtkImageData,
-    vtkMultiBlockDataGroupFilter,
     vtkRTAnalyticSource,
     vtkStreamingDemandDrivenPipeline,
 )
@@ -37,19 +32,10 @@ def path(tmp_path):
     return pvdi.VDISeries(vdis, TIMES).save(tmp_path / "a.vdis")
 
 
-def reader_of(path):
-    reader = VDIReader()
-    reader.SetFileName(path)
-    return reader
-
-
 def announced(algorithm):
     """What an algorithm's output port says of times: the steps and the range."""
     algorithm.UpdateInformation()
     information, keys = algorithm.GetOutputInformation(0), vtkStreamingDemandDrivenPipeline
-    if not information.Has(keys.TIME_STEPS()):
-        assert not information.Has(keys.TIME_RANGE())
-        return None
     return information.Get(keys.TIME_STEPS()), information.Get(keys.TIME_RANGE())
 
 
@@ -59,15 +45,13 @@ def time_of(image):
 
 
 def test_the_reader_gives_the_step_nearest_to_the_time_down_the_pipeline(path):
-    """Each asks what is before it for its time: filters of VTK's, ours, and a mapper."""
-    series, reader, mapper = pvdi.read(path), reader_of(path), pvdi.VDIMapper()
-    voi, picture = vtkExtractVOI(), VDIToImage()
-    for each in (voi, picture, mapper):
+    """Each asks what is before it for its time: a filter, and a mapper."""
+    series, reader, mapper = pvdi.read(path), VDIReader(), pvdi.VDIMapper()
+    reader.SetFileName(path)
+    picture = VDIToImage()
+    for each in (picture, mapper):
         each.SetInputConnection(reader.GetOutputPort())
-    assert announced(reader) == announced(voi) == announced(picture) == (TIMES, (0.5, 4.0))
-    reader.Update()
-    assert vdi_from_image(reader.GetOutputDataObject(0)).equals(series[0])
-    assert mapper.GetVDI().equals(series[0])
+    assert announced(reader) == announced(picture) == (TIMES, (0.5, 4.0))
     for time, step in ASKED:
         reader.UpdateTimeStep(time)
         image = reader.GetOutputDataObject(0)
@@ -76,23 +60,6 @@ def test_the_reader_gives_the_step_nearest_to_the_time_down_the_pipeline(path):
         picture.UpdateTimeStep(time)
         assert time_of(image) == time_of(picture.GetOutputDataObject(0)) == TIMES[step]
         assert picture.GetOutputDataObject(0).GetDimensions()[:2] == series[step].picture_size
-
-
-def test_a_series_grows_while_it_is_read(path, tmp_path):
-    series, reader = pvdi.read(path), reader_of(tmp_path / "b.vdis")
-    mapper = pvdi.VDIMapper()
-    with pytest.raises(VDIFileError, match=r"b\.vdis cannot be read"):
-        reader.Update()
-    assert announced(reader) is None
-    with pvdi.SeriesWriter(tmp_path / "b.vdis", precision=series[0].precision) as writer:
-        for i, vdi in enumerate(series):
-            writer.append(vdi, TIMES[i])
-            assert announced(reader)[0] == TIMES[: i + 1]
-            reader.UpdateTimeStep(9.0)
-            assert time_of(reader.GetOutputDataObject(0)) == TIMES[i]
-            if i == 0:
-                mapper.SetInputConnection(reader.GetOutputPort())
-            assert mapper.GetVDI().equals(vdi)
 
 
 SIZE = (24, 18)
@@ -133,10 +100,6 @@ def ball_at(step):
     return ball
 
 
-def made_of(volume, camera=CAMERA, size=SIZE):
-    return pvdi.generate(volume, camera, size, volume_property=some_property())
-
-
 def source_of(producer):
     return ready_source(producer, CAMERA, WindowSize=SIZE)
 
@@ -144,26 +107,12 @@ def source_of(producer):
 @pytest.fixture(scope="module")
 def vdis(default_runtime):
     """What generate makes of each step."""
-    made = [made_of(ball_at(step)) for step in range(3)]
-    assert made[0].n_supersegments > 200
+    made = [
+        pvdi.generate(ball_at(step), CAMERA, SIZE, volume_property=some_property())
+        for step in range(3)
+    ]
     assert not made[0].equals(made[1])
-    assert not made[1].equals(made[2])
     return made
-
-
-def test_a_source_makes_a_vdi_of_the_time_that_is_asked_for(vdis):
-    producer = Moving()
-    source = source_of(producer)
-    assert announced(source) == (TIMES, (0.5, 4.0))
-    for time, step in ASKED:
-        source.UpdateTimeStep(time)
-        vdi = source.GetVDI()
-        assert vdi.equals(vdis[step])
-        assert time_of(source.GetOutputDataObject(0)) == TIMES[step]
-        reads = len(producer.read)
-        source.UpdateTimeStep(TIMES[step])
-        # Of the same data none is made again; VTK 9.4 has the producer make them again
-        assert source.GetVDI() is vdi or len(producer.read) > reads
 
 
 def test_each_source_keeps_its_time_whatever_others_ask_for(vdis):
@@ -172,100 +121,23 @@ def test_each_source_keeps_its_time_whatever_others_ask_for(vdis):
     early.UpdateTimeStep(0.5)
     late.UpdateTimeStep(4.0)
     for source, step in ((early, 0), (late, 2), (early, 0)):
-        assert source.GetVolume().origin == ball_at(step).origin
-        assert source.MakeRequest().volume.origin == ball_at(step).origin
         assert SourceInput(source).vdi().equals(vdis[step])
+        assert time_of(source.GetOutputDataObject(0)) == TIMES[step]
     # Without a time of its own a source takes what there is
     third = source_of(producer)
     producer.UpdateTimeStep(1.0)
     assert third.GetVDI().equals(vdis[1])
 
 
-@pytest.fixture
-def drawn():
-    """A producer, the source behind it, and the plotter and the actor that draw its VDI."""
-    producer = Moving()
-    source, mapper, actor = source_of(producer), pvdi.VDIMapper(), pvdi.VDIActor()
-    mapper.SetInputConnection(source.GetOutputPort())
-    mapper.SetDraw("vdi")
-    actor.SetMapper(mapper)
-    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
-    plotter.renderer.AddVolume(actor)
-    return producer, source, plotter, actor
-
-
-@pytest.mark.gl
-def test_a_mapper_draws_the_time_that_is_asked_of_the_source_or_before_it(vdis, drawn):
-    producer, source, plotter, actor = drawn
-    plotter.show(auto_close=False)
-    for asked in (producer, source):
-        for time, step in ASKED[:3]:
-            asked.UpdateTimeStep(time)
-            plotter.render()
-            assert actor.vdi.equals(vdis[step])
-
-
-@pytest.mark.gl
-def test_in_a_watched_window_the_volume_is_drawn_until_its_vdi_is_there(gate, drawn):
-    producer, source, plotter, actor = drawn
-    actor.GetMapper().SetInteractiveOffScreen(True)
-    plotter.show(auto_close=False)
-    asked = vtkStreamingDemandDrivenPipeline.UPDATE_TIME_STEP()
-    for generation, (algorithm, step) in enumerate(((producer, 2), (producer, 1), (source, 0)), 2):
-        # Asked for, and not made yet
-        algorithm.GetOutputInformation(0).Set(asked, TIMES[step])
-        gate.clear()
-        frame(plotter)
-        assert actor.status.stand_in
-        gate.set()
-        frames_until(plotter, lambda: not actor.status.stand_in)
-        assert actor.status.generation == generation
-        assert actor.vdi.equals(made_of(ball_at(step), actor.vdi.camera, actor.vdi.window_size))
-
-
-def test_the_writer_writes_all_times(vdis, tmp_path):
-    producer, writer = Moving(), VDIWriter()
-    source = source_of(producer)
-    writer.SetInputConnection(source.GetOutputPort())
-    writer.SetFileName(tmp_path / "made.vdis")
-    writer.Write()
-    assert producer.read == [0, 1, 2]
-    series = pvdi.read(tmp_path / "made.vdis")
-    assert series.times == TIMES
-    for made, vdi in zip(series, vdis, strict=True):  # as generate_series and SeriesWriter do
-        assert made.precision == "8-byte"
-        assert made.equals(vdi.with_precision("8-byte"))
-    writer.SetPrecision("exact")
-    writer.Write()
-    exact = pvdi.read(tmp_path / "made.vdis")
-    assert all(made.equals(vdi) for made, vdi in zip(exact, vdis, strict=True))
-    writer.SetInputData(vdi_to_image(vdis[0]))
-    with pytest.raises(InvalidArgumentError, match="announces no time steps"):
-        writer.Write()
-    assert len(pvdi.read(tmp_path / "made.vdis")) == 3
-
-
 def test_a_series_of_a_source_with_times(vdis):
-    """Each step is read when its turn comes."""
     producer = Moving()
     prop = some_property()
     series = pvdi.generate_series(producer, CAMERA, SIZE, volume_property=prop, precision="exact")
     assert producer.read == [0, 1, 2]
     assert series.times == TIMES
-    for step in range(3):
-        assert series[step].equals(vdis[step])
-    assert producer.read == [0, 1, 2]
+    assert all(one.equals(other) for one, other in zip(series, vdis, strict=True))
 
 
 def test_what_cannot_be_a_series_is_refused():
     with pytest.raises(InvalidArgumentError, match="vtkRTAnalyticSource announces no time steps"):
         pvdi.generate_series(vtkRTAnalyticSource(), CAMERA, SIZE)
-    two_blocks = Moving()
-    blocks, times = steps_and_times(two_blocks)
-    assert (len(blocks), times) == (3, TIMES)
-    assert two_blocks.read == []
-    group = vtkMultiBlockDataGroupFilter()
-    group.AddInputConnection(two_blocks.GetOutputPort())
-    group.AddInputConnection(two_blocks.GetOutputPort())
-    with pytest.raises(UnsupportedError, match="MultiBlock"):
-        pvdi.generate_series(group, CAMERA, SIZE)

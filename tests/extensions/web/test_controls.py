@@ -8,27 +8,18 @@ from PIL import Image
 from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.extensions.web import _LOOK
-from pyvista_vdi.extensions.web.page import page as page_of
-from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.standard_cases import filling_camera
 
 #: Of pictures that are compared, and of viewers: large enough for a bar and its settings.
 SIZE, ROOM = (161, 91), (480, 330)
 PHONE = {"viewport": {"width": 300, "height": 420}, "has_touch": True, "is_mobile": True}
 
-BAR = ["Reset the view", "Save the picture (PNG)", "Full screen", "Settings"]
-AXES = {"+x": (1, 0, 0), "\u2212x": (-1, 0, 0), "+y": (0, 1, 0), "\u2212y": (0, -1, 0)}
-AXES |= {"+z": (0, 0, 1), "\u2212z": (0, 0, -1), "iso": (1, 1, 1)}
-VIEWS = [f"Seen from {name}" for name in AXES]
+BAR = ["Reset the view", "Save the picture (PNG)", "Settings"]
 CLIPS = [f"Clip {axis} {end}" for axis in "xyz" for end in ("from", "to")]
 FACTORS = ["Brightness", "Opacity"]
-PRESETS = [f"Opacity: {name}" for name in ("Ramp", "Soft", "Peak", "Step")]
 EDITOR = [
     *(f"Point {k} of 3" for k in (1, 2, 3)),
-    *("Add a point", "Remove the point", "Colours", "Level", "Window", *PRESETS),
+    *("Add a point", "Remove the point", "Colours", "Level", "Window"),
 ]
 
 #: What a screen reader says of what has the focus.
@@ -71,11 +62,8 @@ def from_disk(open_page, tmp_path):
     """Open a page of a VDI, or of one that keeps values, with ``settings`` open or not."""
 
     def from_disk(shown, *, settings=False, hash_="", **options):
-        path = tmp_path / "a.html"
-        if isinstance(shown, pvdi.VDI):
-            path.write_bytes(page_of(shown))
-        else:
-            shown.save(path, transfer_function=look(START))
+        how = {} if isinstance(shown, pvdi.VDI) else {"transfer_function": look(START)}
+        path = shown.save(tmp_path / "a.html", **how)
         if settings:
             options = {"viewport": {"width": 300, "height": 420}, **options}
         page = open_page(url=path.as_uri() + hash_, **options)
@@ -114,16 +102,6 @@ def tabbed(page):
         assert len(names) < 50
 
 
-def nameless(page):
-    """Parts of the accessibility tree that are used and have no name."""
-    session = page.page.context.new_cdp_session(page.page)
-    nodes = session.send("Accessibility.getFullAXTree")["nodes"]
-    kinds = {"button", "slider", "checkbox", "combobox", "group", "image", "Canvas"}
-    seen = [node for node in nodes if not node["ignored"] and node["role"]["value"] in kinds]
-    assert seen
-    return [node["role"]["value"] for node in seen if not node.get("name", {}).get("value")]
-
-
 def points_of(page):
     return page.evaluate("(viewer.look.transfer ?? viewer.values.start).points")
 
@@ -131,20 +109,12 @@ def points_of(page):
 # -- names, keys and fingers -----------------------------------------------------------------------
 
 
-def test_keys_reach_and_use_every_control(vdi, ball):
+def test_keys_reach_and_use_every_control(ball):
     assert tabbed(ball) == BAR
     opened(ball)
-    assert tabbed(ball) == [*BAR, "Settings", *VIEWS, *FACTORS, *CLIPS, "As it was made"]
-    assert not nameless(ball)
+    assert tabbed(ball) == [*BAR, "Settings", *FACTORS, *CLIPS, "As it was made"]
     camera = ball.evaluate("viewer.camera")
-    centre = np.reshape(vdi.bounds, (3, 2)).mean(axis=1)
-    for name, direction in zip(VIEWS, AXES.values(), strict=True):
-        pressed(ball, name, "Enter")
-        seen = ball.evaluate("viewer.camera")
-        arm = np.subtract(seen["position"], seen["focal_point"])
-        np.testing.assert_allclose(seen["focal_point"], centre, atol=1e-9)
-        length = np.linalg.norm(direction) * np.linalg.norm(arm)
-        assert direction @ arm == pytest.approx(length, rel=1e-12), name
+    ball.evaluate("viewer.camera = { ...viewer.camera, view_angle: 12 }")
     pressed(ball, "Reset the view", "Enter")
     assert ball.evaluate("viewer.camera") == camera
     for name in (*FACTORS, *CLIPS):
@@ -158,26 +128,22 @@ def test_keys_reach_and_use_every_control(vdi, ball):
     assert ball.evaluate("viewer.look") == whole
     pressed(ball, "As it was made", "Escape")
     assert ball.evaluate(FOCUSED) == "Settings"
-    assert tabbed(ball) == BAR
-    ball.page.locator("canvas[role]").press("f")
-    ball.wait_for("document.fullscreenElement === viewer")
-    pressed(ball, "Full screen", "Enter")
-    ball.wait_for("document.fullscreenElement === null")
+    ball.evaluate("viewer.setAttribute('controls', 'none')")
+    assert ball.page.get_by_role("button").count() == 0
 
 
-@pytest.mark.every(2)
 @pytest.mark.parametrize("width", [390, 600])
 def test_settings_do_not_cover_the_picture_of_a_narrow_page(width, kept, from_disk):
     viewport = {"width": width, "height": 400}
     options = {"viewport": viewport, "color_scheme": "dark", "reduced_motion": "reduce"}
     page = from_disk(kept, settings=True, **options)
-    style = """(name) => {
+    style = """() => {
       const { backgroundColor, color, transitionDuration } =
-        getComputedStyle(viewer.shadowRoot.querySelector(name));
+        getComputedStyle(viewer.shadowRoot.querySelector(".bar"));
       const numbers = (text) => text.match(/[\\d.]+/g).map(Number);
       return [backgroundColor, color, transitionDuration].map(numbers);
     }"""
-    behind, ink, fades = page.evaluate(style, ".bar")
+    behind, ink, fades = page.evaluate(style)
     assert fades == [0]
     assert ink[0] - behind[0] > 150
     panel, bar, canvas = (
@@ -196,25 +162,6 @@ def test_settings_do_not_cover_the_picture_of_a_narrow_page(width, kept, from_di
         assert page.page.locator("vdi-viewer canvas[role]").bounding_box()["height"] == 400
 
 
-def test_fingers_reach_it(kept, from_disk):
-    page = from_disk(kept, **PHONE)
-    page.page.get_by_label("Settings", exact=True).first.tap()
-    before = picture(page, SIZE)
-    page.page.get_by_role("button", name="Seen from iso").tap()
-    page.evaluate("viewer.resetCamera()")
-    point = page.page.get_by_role("slider", name="Point 2 of 3").bounding_box()
-    x, y = point["x"] + point["width"] / 2, point["y"] + point["height"] / 2
-    session = page.page.context.new_cdp_session(page.page)
-    for kind, up in (("touchStart", 0), ("touchMove", 20), ("touchMove", 40)):
-        at = [{"x": x, "y": y - up}]
-        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": at})
-    session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-    assert points_of(page)[3] == pytest.approx(0.125 + 40 / 120, abs=0.03)
-    assert np.abs(picture(page, SIZE) - before.astype(float)).max() > 10
-    page.page.get_by_role("button", name="Opacity: Ramp").tap()
-    assert points_of(page) == [0, 0, 1, 1]
-
-
 def test_a_saved_picture_is_what_is_seen(ball):
     ball.evaluate("viewer.background = [0.2, 0.4, 0.6], document.title = 'A ball: soft/1'")
     before = picture(ball, ROOM).astype(float)
@@ -226,27 +173,6 @@ def test_a_saved_picture_is_what_is_seen(ball):
     assert saved.shape[1::-1] == ROOM
     assert (saved[..., 3] == 255).all()
     assert np.abs(saved[..., :3] - expected).max() <= 2  # straight colours have eight bits, too
-
-
-@pytest.mark.slow
-def test_without_controls_there_are_none(ball):
-    ball.evaluate("viewer.setAttribute('controls', 'none')")
-    assert ball.page.get_by_role("button").count() == 0
-    before = ball.evaluate("viewer.camera")
-    ball.page.locator("canvas[role]").press("ArrowLeft")
-    assert ball.evaluate("viewer.camera") != before
-    ball.page.locator("canvas[role]").press("f")
-    assert ball.evaluate("document.fullscreenElement") is None
-    ball.evaluate("viewer.removeAttribute('controls')")
-    assert ball.page.get_by_role("button").count() >= 3
-
-
-@pytest.mark.parametrize("kind", ["html", "series"])
-def test_other_controls_are_refused_before_anything_is_written(kind, vdi, tmp_path):
-    shown = vdi if kind == "html" else pvdi.VDISeries([vdi], [0.0])
-    with pytest.raises(InvalidArgumentError, match=r"controls must be 'all' or 'none'; got 'bar'"):
-        shown.save(tmp_path / "a.html", controls="bar")
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
@@ -276,12 +202,10 @@ for (const kind of ["keydown", "keypress", "keyup"]) {
 }
 """
 
-ARROWS = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"]
-TAKEN = [*ARROWS, *(f"Shift+{key}" for key in ARROWS), "+", "=", "-", "r", "Shift+R"]
+TAKEN = ["ArrowLeft", "ArrowUp", "Shift+ArrowRight", "+", "-", "r", "Shift+R"]
 NOT_TAKEN = [
-    *("a", "b", "d", "m", "x", "z", "1", "Escape", "Enter", "Delete", "Home", "PageDown", "Space"),
-    *(",", ".", "Shift+Enter", "Control+Enter", "Control+s", "Control+b", "Alt+r", "Meta+r"),
-    *("Control+ArrowLeft", "Alt+ArrowUp", "Control+=", "Control+-", "Control+Shift+ArrowUp"),
+    *("a", "d", "1", "Escape", "Enter", "Delete", "PageDown", "Space", ",", "Shift+Enter"),
+    *("Control+s", "Alt+r", "Meta+r", "Control+ArrowLeft", "Control+-"),
 ]
 
 
@@ -310,14 +234,10 @@ def test_keys_that_it_takes_reach_nothing_else_and_others_do(vdi, open_page):
     elsewhere = "document.querySelector('p')"
     for key in NOT_TAKEN:
         assert told(canvas, key) == told(elsewhere, key) != [], key
-    keys = [*"rR+-= ,.", *ARROWS]
+    keys = [*"rR+-= ,.", "ArrowLeft"]
     assert told("document.querySelector('input')", *keys) == told(elsewhere, *keys)
     assert page.evaluate("document.querySelector('input').value") == "rR+-= ,."
     assert page.evaluate("viewer.camera") == camera
-    page = open_page(SIZE, before=LISTENING)  # with nothing to be turned
-    page.evaluate("document.body.append(document.createElement('p'))")
-    page.evaluate("document.querySelector('p').tabIndex = 0")
-    assert told(canvas, *TAKEN) == told(elsewhere, *TAKEN)
 
 
 # -- the editor ------------------------------------------------------------------------------------
@@ -345,7 +265,6 @@ def test_pictures_of_values_are_those_of_render(kept, from_disk):
         assert_like(page, packed.classified(transfer_function=look(points, clim)), turned)
 
 
-@pytest.mark.slow
 def test_exact_values_are_shown_and_a_file_without_a_look_has_a_ramp(kept, open_page, tmp_path):
     page = open_page(SIZE)
     page.load(kept.save(tmp_path / "kept.vdi", compression="deflate").read_bytes())
@@ -364,27 +283,22 @@ def test_exact_values_are_shown_and_a_file_without_a_look_has_a_ramp(kept, open_
     assert_like(page, kept.classified(transfer_function=told), kept.camera, 2.0)
 
 
-def test_mouse_and_keys_edit_and_a_link_has_it(kept, from_disk):
-    page = from_disk(kept, settings=True)
+def test_mouse_keys_and_fingers_edit_and_a_link_has_it(kept, from_disk):
+    page = from_disk(kept, settings=True, **PHONE)
     made = picture(page, SIZE)
     assert points_of(page) == START
-    names = tabbed(page)
-    assert names == [*BAR, "Settings", *VIEWS, *EDITOR, *CLIPS, "As it was made"]
-    assert not nameless(page)
+    assert tabbed(page) == [*BAR, "Settings", *EDITOR, *CLIPS, "As it was made"]
     page.evaluate("viewer.shadowRoot.querySelector('.panel').scrollTop = 0")
     point = page.page.get_by_role("slider", name="Point 2 of 3").bounding_box()
-    mouse = page.page.mouse
     x, y = point["x"] + point["width"] / 2, point["y"] + point["height"] / 2
-    mouse.move(x, y)
-    mouse.down()
-    mouse.move(x + 9, y - 30, steps=3)
-    mouse.up()
-    moved = points_of(page)
-    assert len(moved) == 6
-    assert moved[2] > 0.5
-    assert moved[3] == pytest.approx(0.125 + 30 / 120, abs=0.02)
+    session = page.page.context.new_cdp_session(page.page)
+    for kind, up in (("touchStart", 0), ("touchMove", 20), ("touchMove", 40)):
+        at = [{"x": x, "y": y - up}]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": at})
+    session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    assert points_of(page)[3] == pytest.approx(0.125 + 40 / 120, abs=0.03)
     assert np.abs(picture(page, SIZE) - made.astype(float)).max() > 10
-    mouse.click(x + 40, y - 60)
+    page.page.mouse.click(x + 40, y - 60)
     assert len(points_of(page)) == 8
     pressed(page, "As it was made", "Enter")
     np.testing.assert_array_equal(picture(page, SIZE), made)
@@ -394,7 +308,6 @@ def test_mouse_and_keys_edit_and_a_link_has_it(kept, from_disk):
     pressed(page, "Point 2 of 3", "Home")
     assert points_of(page)[2] == 0  # not beyond its neighbour
     pressed(page, "Point 2 of 3", "+")
-    assert len(points_of(page)) == 8
     assert page.evaluate(FOCUSED) == "Point 3 of 4"
     pressed(page, "Point 3 of 4", "Delete")
     assert len(points_of(page)) == 6
@@ -403,11 +316,9 @@ def test_mouse_and_keys_edit_and_a_link_has_it(kept, from_disk):
     low, high = page.evaluate("viewer.look.transfer.clim")
     assert high - low < RANGE[1]
     page.page.get_by_label("Colours").last.select_option("viridis")
-    pressed(page, "Opacity: Peak", "Enter")
-    assert page.evaluate("viewer.look.transfer.cmap") == "viridis"
     assert page.evaluate("viewer.transferFunction.colors[0]") != [1, 0, 0]
 
-    page.wait_for("location.hash.includes('points')")
+    page.wait_for("location.hash.includes('viridis')")
     seen, link = picture(page, SIZE), page.evaluate("location.hash")
     other = from_disk(kept, hash_=link)
     assert other.evaluate("viewer.look") == page.evaluate("viewer.look")
@@ -429,13 +340,6 @@ def test_colour_maps_are_those_of_matplotlib():
         assert np.abs(np.array(colors) - expected).max() <= 2.01 / 255, name
 
 
-def test_a_page_takes_the_words_of_classified():
-    light = {"shade", "ambient", "diffuse", "specular", "specular_power"}
-    assert set(declared(Classification)) - set(_LOOK) - light == {
-        *("scalars", "preference", "interpolation", "blending"),
-    }
-
-
 # -- links -----------------------------------------------------------------------------------------
 
 INFOS = """
@@ -444,60 +348,30 @@ console.info = (text) => infos.push(text);
 """
 
 
-def link_of(page):
-    page.evaluate("viewer.ready.then(() => new Promise((next) => setTimeout(next, 500)))")
-    return page.evaluate("location.href")
-
-
 def test_a_link_shows_what_was_seen_and_the_address_is_followed(vdi, from_disk):
     page = from_disk(vdi, hash_="#other=1", before=INFOS)
-    begun, home = link_of(page), page.evaluate("viewer.camera")
-    assert begun.endswith("a.html#other=1")  # nothing is said of what the page begins with
-    length = page.evaluate("history.length")
+    home, length = page.evaluate("viewer.camera"), page.evaluate("history.length")
     page.evaluate(
         """() => {
           viewer.camera = { ...viewer.camera, position: [2.1, 1 / 3, -1.7], view_angle: 41 };
           viewer.look = { brightness: 1.5, opacity: 2, clip: [0.1, 1, 0, 1, 0, 0.7] };
         }"""
     )
-    link = link_of(page)
-    assert link.startswith(f"{begun}&view=position:2.1,0.3333333333333333,-1.7/focal_point:")
+    page.wait_for("location.hash.startsWith('#other=1&view=') && location.hash.includes('clip')")
+    link = page.evaluate("location.hash")
     assert page.evaluate("history.length") == length
-    shown = picture(page, SIZE)
-    other = from_disk(vdi, hash_=link.removeprefix(begun.partition("#")[0]), before=INFOS)
+    other = from_disk(vdi, hash_=link, before=INFOS)
     assert other.evaluate("viewer.look.clip") == [0.1, 1, 0, 1, 0, 0.7]
-    np.testing.assert_array_equal(picture(other, SIZE), shown)
-    assert link_of(other) == link
-    other.evaluate("location.hash = location.hash.replace('opacity:2', 'opacity:3')")
+    np.testing.assert_array_equal(picture(other, SIZE), picture(page, SIZE))
+    assert other.evaluate("location.hash") == link
+    change = "location.hash.replace(encodeURIComponent('\"opacity\":2'), '%22opacity%22%3A3')"
+    other.evaluate(f"location.hash = {change}")
     other.wait_for("viewer.look.opacity === 3")
     other.evaluate("location.hash = '#elsewhere'")  # a place in the page, say
-    other.evaluate("location.hash = '#view=position:1,2'")
+    other.evaluate("location.hash = '#view={}'")
     other.wait_for("infos.length === 1")
-    assert "is not followed: The position" in other.evaluate("infos[0]")
+    assert "is not followed: A camera's position" in other.evaluate("infos[0]")
     assert other.evaluate("viewer.look.opacity") == 3
     other.evaluate("location.hash = ''")
     other.wait_for("viewer.look.opacity === 1")
     assert other.evaluate("viewer.camera") == home
-
-
-@pytest.mark.slow
-def test_of_several_viewers_the_first_of_a_key_is_followed(vdi, open_page):
-    page = open_page(SIZE, attributes='hash="left"', files={"ball.vdi": file_of(vdi)})
-    page.evaluate(
-        """async () => {
-          for (const key of ["left", "right", null]) {
-            const viewer = document.createElement("vdi-viewer");
-            if (key) viewer.setAttribute("hash", key);
-            document.body.append(viewer);
-          }
-          window.all = [...document.querySelectorAll("vdi-viewer")];
-          await Promise.all(all.map((each) => each.load("ball.vdi")));
-          all.forEach((each, k) => (each.look = { opacity: k + 2 }));
-          await new Promise((next) => setTimeout(next, 500));
-        }"""
-    )
-    parts = dict(part.split("=") for part in page.evaluate("location.hash")[1:].split("&"))
-    assert sorted(parts) == ["left", "right"]
-    assert parts["left"].endswith("/opacity:2")
-    assert parts["right"].endswith("/opacity:4")
-    page.evaluate("history.replaceState(null, '', '#')")

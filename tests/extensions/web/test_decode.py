@@ -11,7 +11,7 @@ from in_node import in_node
 from rewriting import described, rewritten
 from strategies import random_vdi
 
-from pyvista_vdi.io.vdi_file.coarse import coarser
+from pyvista_vdi.io.vdi_file.writer import coarser
 
 DECODED = """async (...texts) => {
   const { decodeVDI } = await from("decode.js");

@@ -12,7 +12,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-import pyvista as pv
 from browsers import HELPERS, array_of
 from plugin_scenes import soft_ball
 from virtual_screen import virtual_screen
@@ -113,21 +112,3 @@ def test_a_page_from_disk_is_drawn_as_render_draws_it(tmp_path, default_runtime)
     assert expected.max() > 200
     # 8 bits, and other roundings of float32
     assert np.abs(shown - expected).max() <= 1
-
-
-@pytest.mark.gl
-def test_a_scene_is_drawn_as_vtk_draws_it(tmp_path):
-    """Opaque meshes and a line about a VDI."""
-    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
-    plotter.add_vdi(soft_ball(), cmap="viridis", opacity="linear", show_scalar_bar=False)
-    plotter.add_mesh(pv.Sphere(radius=0.4, center=(1.2, 0.9, 0.9)), color="tomato")
-    plotter.add_mesh(pv.Line((-2, -1, 0), (2, 1, 1)), color="k")
-    plotter.remove_all_lights()
-    plotter.add_light(pv.Light(light_type="headlight"))
-    plotter.vdi.export_html(tmp_path / "scene.html")
-    picture = picture_in_firefox(tmp_path, tmp_path / "scene.html").astype(float)
-    got = picture[..., :3] + 255 - picture[..., 3:]
-    expected = plotter.screenshot()[..., :3].astype(float)
-    plotter.close()
-    assert np.ptp(expected) > 200
-    assert np.abs(got - expected).mean() <= 1  # .4 seen, by silhouettes

@@ -10,7 +10,6 @@ from strategies import random_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import io
-from pyvista_vdi.cli import main
 from pyvista_vdi.errors import VDIFileError
 
 
@@ -66,16 +65,3 @@ def test_damaged_pages(change, why, tmp_path):
     page.write_bytes(change(page.read_bytes()))
     with pytest.raises(VDIFileError, match=rf"small\.html {why}|damaged: .*{why}"):
         pvdi.read(page)
-
-
-def test_the_command_line_takes_pages(tmp_path, capsys):
-    source = small_vdi().save(tmp_path / "a.vdi")
-    page, again = tmp_path / "a.html", tmp_path / "again.vdi"
-    assert main(["convert", str(source), "-o", str(page), "--precision", "exact"]) == 0
-    assert main(["convert", str(page), "-o", str(again), "--compression", "deflate"]) == 0
-    assert io.read(again).equals(small_vdi())
-    assert io.read_info(again).codec == "deflate"
-    assert main(["info", str(page)]) == 0
-    assert "deflate" in capsys.readouterr().out
-    assert main(["convert", str(source), "-o", str(page), "--compression", "lz4"]) == 1
-    assert "must be deflate" in capsys.readouterr().err

@@ -37,13 +37,13 @@ window.WebSocket = class extends WebSocket {
 
 @pytest.fixture(scope="module")
 def server(default_runtime):
-    with web.serve([BALL, BALL], port=0, wait=False, announce=None, **LOOK) as serving:
+    with web.serve([BALL, BALL], port=0, wait=False, **LOOK) as serving:
         yield serving
 
 
 @pytest.fixture
 def page(server, open_page):
-    viewport = {"width": SIZE[0], "height": SIZE[1] + 100}
+    viewport = {"width": SIZE[0], "height": SIZE[1] + 20}
     return open_page(url=server.url, before=SOCKETS, viewport=viewport)
 
 
@@ -53,9 +53,9 @@ def camera_of(page):
     return pvdi.Camera(**{name: state[name] for name in names})
 
 
-def ssim_of(page, **look):
+def ssim_of(page):
     shown = picture(page, SIZE).astype(np.float32) / 255
-    truth = pvdi.render_volume(BALL, camera_of(page), SIZE, **{**LOOK, **look})
+    truth = pvdi.render_volume(BALL, camera_of(page), SIZE, **LOOK)
     return pvdi.compare_images(shown, truth).ssim
 
 
@@ -83,24 +83,8 @@ def test_a_page_is_sent_what_its_view_needs(page):
     page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 4 }")
     wait(page, "remote.received.vdis === 2")
     assert ssim_of(page) > ENOUGH
-
-
-@pytest.mark.slow
-def test_look_and_time_are_changed_in_the_page(page):
-    wait(page, "remote.received.vdis === 1")
-    page.page.locator("#controls").get_by_label("Colours").select_option("hot")
-    wait(page, "remote.received.vdis >= 2")
-    assert ssim_of(page, cmap="hot") > ENOUGH
-
-    page.page.locator("#controls").get_by_label("Time").fill("1")
-    wait(page, "remote.received.vdis >= 3")
-
-
-@pytest.mark.slow
-def test_a_lost_connection_comes_back(page):
-    wait(page, "remote.received.vdis === 1")
-    page.evaluate("sockets.at(-1).close(); viewer.camera = { ...viewer.camera, view_angle: 5 }")
-    wait(page, "remote.received.vdis === 2")
+    page.page.get_by_label("Time step").fill("1")
+    wait(page, "remote.received.vdis === 3")
 
 
 @pytest.mark.slow
@@ -114,56 +98,15 @@ def test_axe_finds_nothing(scheme, server, open_page):
     assert_axe_finds_nothing(page)
 
 
-def named_controls(page):
-    """The controls of a page that can be used, by what a screen reader says of them."""
-    session = page.page.context.new_cdp_session(page.page)
-    nodes = session.send("Accessibility.getFullAXTree")["nodes"]
-    kinds = {"slider", "spinbutton", "combobox", "checkbox"}
-    seen = [node for node in nodes if not node["ignored"] and node["role"]["value"] in kinds]
-    return [(node["role"]["value"], node["name"]["value"]) for node in seen]
-
-
-def test_controls_have_names_and_a_range_that_is_none_is_said(page):
-    wait(page, "remote.received.vdis >= 1")
-    names = named_controls(page)
-    assert len(names) == len(set(names)) == 5
-    assert all(name and not name.replace(".", "").isdigit() for _, name in names)
-
-    line, inputs = page.page.locator("#status"), page.page.locator("input[type=number]")
-    valid = "[...document.querySelectorAll('input[type=number]')].map((it) => it.validity.valid)"
-    page.evaluate("() => { remote.looks = []; remote.setLook = (look) => remote.looks.push(look) }")
-    inputs.nth(0).fill("200")
-    inputs.nth(1).fill("100")
-    inputs.nth(1).press("Tab")
-    assert page.evaluate(valid) == [False, False]
-    assert inputs.nth(0).get_attribute("aria-invalid") == "true"
-    assert "200 is not below 100" in line.inner_text()
-    # Nothing of it was told, and what else is chosen leaves the range as it was
-    clims = [[200, page.evaluate("remote.hello.range[1]")]]
-    assert page.evaluate("remote.looks.map(({ clim }) => clim)") == clims
-    page.page.locator("#controls").get_by_label("Colours").select_option("hot")
-    assert page.evaluate("remote.looks.map(({ clim }) => clim)") == 2 * clims
-    inputs.nth(1).fill("250")
-    inputs.nth(1).press("Tab")
-    assert page.evaluate(valid) == [True, True]
-    assert "below" not in line.inner_text()
-    assert page.evaluate("remote.looks.at(-1).clim") == [200, 250]
-    for key, wrong in (("-", True), ("Backspace", False)):
-        inputs.nth(0).fill("")
-        inputs.nth(0).press(key)
-        inputs.nth(0).press("Tab")
-        assert ("two numbers" in line.inner_text()) == wrong
-
-
 def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
     default_runtime, open_page
 ):
     def serve(token, port=0):
-        return web.serve([BALL], port=port, token=token, wait=False, announce=None, **LOOK)
+        return web.serve([BALL], port=port, token=token, wait=False, **LOOK)
 
     line = "document.querySelector('#status').textContent"
     serving = serve("a")
-    viewport = {"width": SIZE[0], "height": SIZE[1] + 100}
+    viewport = {"width": SIZE[0], "height": SIZE[1] + 20}
     refusals = "ERR_CONNECTION|WebSocket|403"
     page = open_page(url=serving.url, viewport=viewport, expected=refusals)
     wait(page, "remote.received.vdis === 1")
@@ -179,7 +122,4 @@ def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
     serving.close()
     with serve("b", serving.port):
         wait(page, f"{line}.includes('no longer valid')")
-        asked = len(page.urls)
-        page.page.wait_for_timeout(2500)
-        assert len(page.urls) == asked
         assert "trying" not in page.evaluate(line)

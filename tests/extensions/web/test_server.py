@@ -1,7 +1,6 @@
 """Served VDIs: what clients get, whom the server lets in, and that none can harm another."""
 
 import asyncio
-import contextlib
 import io
 import json
 import math
@@ -13,26 +12,21 @@ import subprocess
 import sys
 import threading
 import urllib.request
-from pathlib import Path
 
 import aiohttp
 import numpy as np
 import pytest
 from aiohttp.test_utils import TestClient, TestServer
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.extensions import web
 from pyvista_vdi.extensions.web.server import Server
-from pyvista_vdi.extensions.web.source import BadMessageError, Source, Wish, wish_after
+from pyvista_vdi.extensions.web.source import Source
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.model.view import View
 
 #: Seconds for whatever must happen: far more than it takes, also beside other tests.
 PATIENCE = 120
@@ -163,30 +157,16 @@ async def test_a_view_gets_a_vdi_of_its_own_with_the_lists_in_view(client):
     assert client.vdis == 1  # nothing is in view: nothing was sent
 
 
-def test_fewer_lists_than_pixels_show_the_same(default_runtime):
-    beside = CAMERA.replace(focal_point=(0.4, 0, 0.3))  # the ball is in a corner of the picture
-    few = source_of(HIGH, lists=2000, **LOOK)
-    size, file = few.make(Wish(View(beside, SIZE)), lambda: False)
-    inner = math.prod(edge - 2 for edge in size)  # whole lists reach beyond by one on each side
-    assert inner < 2000 <= math.prod(size)
-    shown = pvdi.render(reader.read("a.vdi", stream=io.BytesIO(file)), beside, SIZE)
-    truth = pvdi.render_volume(HIGH, beside, SIZE, **LOOK)
-    assert pvdi.compare_images(shown, truth).ssim > 0.97
-
-
 @by_clients(1)
-async def test_transfer_function_and_time_are_changed_by_messages(client):
+async def test_the_time_step_is_changed_by_a_message(client):
     assert client.hello["steps"] == 2
-    assert client.hello["look"] == {"cmap": "bone", "opacity": "linear"}
     await client.look_from(CAMERA)
     await client.vdi()
-    look = {"cmap": "hot", "opacity": [0, 0.2, 1], "clim": [0, 200]}
-    for kind, wish, volume in (("look", look, HIGH), ("time", {"step": 1}, LOW)):
-        await client.say(kind, **wish)
-        vdi = await client.vdi()
-        whole = pvdi.generate(volume, CAMERA, SIZE, **MADE, **look)
-        pictures = (pvdi.render(each, CAMERA, SIZE) for each in (vdi, whole))
-        assert pvdi.compare_images(*pictures).ssim > 0.999  # the same rays but for rounding
+    await client.say("time", step=1)
+    vdi = await client.vdi()
+    whole = pvdi.generate(LOW, CAMERA, SIZE, **MADE, **LOOK)
+    pictures = (pvdi.render(each, CAMERA, SIZE) for each in (vdi, whole))
+    assert pvdi.compare_images(*pictures).ssim > 0.999  # the same rays but for rounding
 
 
 @by_clients(1)
@@ -194,7 +174,7 @@ async def test_of_wishes_that_follow_each_other_fast_the_last_one_counts(client)
     last = CAMERA.azimuth(200)
     for angle in range(0, 200, 2):
         await client.look_from(CAMERA.azimuth(angle))
-        await client.say("look", clim=[0, 200 + angle % 7])
+        await client.say("time", step=angle // 2 % 2)
     await client.look_from(last)
     while (await client.vdi()).camera.position != last.position:
         pass
@@ -244,7 +224,7 @@ async def test_a_busy_client_does_not_keep_another_waiting(busy, quiet):
     await quiet.look_from(CAMERA)
     waiting, sent = asyncio.ensure_future(quiet.vdi()), 0
     while not waiting.done():
-        await busy.say("look", clim=[0, 200 + sent % 2])
+        await busy.say("time", step=(sent + 1) % 2)
         await busy.vdi()
         sent += 1
     assert sent <= 4  # two threads take clients in turn
@@ -258,7 +238,6 @@ async def test_a_slow_client_is_sent_fewer_vdis_and_no_queue(client):
     await client.hear("vdi")
     for angle in range(1, 20):  # while the first is on its way
         await client.look_from(CAMERA.azimuth(angle), size)
-        await asyncio.sleep(0.02)
     while (await client.vdi()).camera.position != CAMERA.azimuth(19).position:
         pass
     assert client.vdis <= 3
@@ -320,9 +299,7 @@ OTHER_EYES = [
     *({"view_angle": 180}, {"parallel_scale": -1}, {"model_transform": []}),
 ]
 OTHERS = [
-    *({"type": "look", "opacity": opacity} for opacity in ([0.5] * 1000, {})),
-    {"type": "look", "cmap": "../../etc/passwd"},
-    {"type": "look", "clim": [1, 1]},
+    {"type": "look", "cmap": "bone"},
     *({"type": "time", "step": step} for step in (2, -1)),
     {"type": "clip", "planes": []},
     {"type": "file", "path": "/etc/passwd"},
@@ -352,45 +329,21 @@ def test_a_bad_message_ends_its_client_and_nothing_else(source):
     assert huge == 1009
 
 
-_json = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
-    lambda inner: st.lists(inner, max_size=6) | st.dictionaries(st.text(max_size=8), inner),
-    max_leaves=8,
-)
-_entries = st.fixed_dictionaries(
-    {"type": st.sampled_from(["view", "look", "time"])},
-    optional={
-        name: _json | st.lists(st.floats(), min_size=2, max_size=6)
-        for name in ("camera", "size", "cmap", "opacity", "clim", "step")
-    },
-)
-
-
-@settings(max_examples=50)
-@given(_entries | _json)
-def test_any_message_is_taken_or_refused(message):
-    offer = {"steps": 2, "cmaps": ["bone"], "opacities": ["linear"]}
-    with contextlib.suppress(BadMessageError):
-        wish = wish_after(json.dumps(message), Wish(), offer)
-        assert isinstance(wish, Wish)
-
-
 EXTREMES = [
     {"position": [1e12, 0, 0]},
     {"position": [0, 0, 1e-12], "view_up": [1, 0, 0]},
     {"position": [0, 0.1, 0], "view_angle": 179.9},
     {"position": [0, -1e9, 0], "parallel_scale": 1e-12},
-    {"position": [0, -9, 0], "parallel_scale": 1e12},
 ]
 
 
-@by_clients(2)
-async def test_extreme_views_harm_nobody(client, other):
+@by_clients(1)
+async def test_extreme_views_harm_nobody(client):
     for eye in EXTREMES:
         await client.say("view", camera={**EYE, **eye}, size=[12, 8192])
         await client.idle()
-    await other.look_from(CAMERA)
-    assert (await other.vdi()).n_supersegments > 0
+    await client.look_from(CAMERA)
+    assert (await client.vdi()).n_supersegments > 0
 
 
 def test_a_client_that_takes_nothing_is_dropped(source):
@@ -428,57 +381,15 @@ def test_of_256_clients_some_are_killed_and_the_others_lose_nothing(source):
     told(story, source, clients=256)
 
 
-def test_closing_tells_the_clients(source):
-    with Server(source, port=0).start() as server:
-
-        async def story():
-            async with aiohttp.ClientSession() as session:
-                url = server.url.replace("/?", "/socket?")
-                client = Client(await session.ws_connect(url, max_msg_size=0))
-                await client.look_from(CAMERA, (640, 480))
-                await client.hear("status")
-                closing = asyncio.ensure_future(asyncio.to_thread(server.close))
-                code = await client.end()
-                await closing
-                return code
-
-        assert asyncio.run(asyncio.wait_for(story(), PATIENCE)) == 1001
-
-
-def test_a_fixed_look_offers_no_other_and_a_range_is_the_one_in_effect(default_runtime):
-    table = pvdi.TransferFunction([(0, 0, 0.2), (1, 0.5, 0)], [0, 0.5], (0, 255))
-    offer = source_of(HIGH, transfer_function=table).offer
-    assert offer["cmaps"] == offer["opacities"] == []
-    with pytest.raises(BadMessageError, match="the look is fixed"):
-        wish_after('{"type": "look", "cmap": "bone"}', Wish(), offer)
-    assert source_of(HIGH, cmap="bone").offer["range"] == list(HIGH.finite_range())
-    assert source_of(HIGH, cmap="bone", clim=(10, 90)).offer["range"] == [10, 90]
-
-
-def test_steps_are_any_object_with_a_length_and_items(default_runtime):
-    class Steps:
-        def __len__(self):
-            return 3
-
-        def __getitem__(self, step):
-            return HIGH
-
-    said = []
-    with web.serve(Steps(), port=0, wait=False, announce=said.append, **LOOK) as server:
-        assert said == [f"Serving at {server.url} (Ctrl-C ends it)"]
-        with urllib.request.urlopen(server.url) as page:
-            assert b"<vdi-viewer" in page.read()
-
-
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C of one process alone")
 def test_the_command_serves_until_ctrl_c(tmp_path, default_runtime):
     import nrrd
 
     for step in range(2):
         nrrd.write(str(tmp_path / f"{step}.nrrd"), HIGH.array, index_order="C")
     command = [sys.executable, "-m", "pyvista_vdi", "serve", "0.nrrd", "1.nrrd", "--port", "0"]
-    flags = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP} if os.name == "nt" else {}
     with subprocess.Popen(
-        [*command, "--cmap", "bone"], cwd=tmp_path, stdout=subprocess.PIPE, text=True, **flags
+        [*command, "--cmap", "bone"], cwd=tmp_path, stdout=subprocess.PIPE, text=True
     ) as process:
         try:
             line = process.stdout.readline()
@@ -492,28 +403,8 @@ def test_the_command_serves_until_ctrl_c(tmp_path, default_runtime):
                     return json.loads((await connection.receive()).data)
 
             assert asyncio.run(hello())["steps"] == 2
-            process.send_signal(signal.CTRL_C_EVENT if os.name == "nt" else signal.SIGINT)
+            process.send_signal(signal.SIGINT)
             assert process.wait(PATIENCE) == 0
             assert process.stdout.read() == "The server has ended\n"
-        finally:
-            process.kill()
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C of one process alone")
-@pytest.mark.parametrize(
-    ("name", "arguments"),
-    [("serve.py", ["0"]), ("trame_app.py", ["--port", "0", "--server", "--host", "127.0.0.1"])],
-)
-def test_an_example_serves_a_page_until_ctrl_c(name, arguments, default_runtime):
-    example = Path(__file__).parents[3] / "examples" / name
-    command = [sys.executable, "-u", str(example), *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            found = (re.search(r"http://127\.0\.0\.1:\d+/\S*", line) for line in process.stdout)
-            with urllib.request.urlopen(next(match[0] for match in found if match)) as response:
-                assert "<!doctype html" in response.read().decode().lower()
-            process.send_signal(signal.SIGINT)
-            assert process.wait(PATIENCE) in (0, -signal.SIGINT)
         finally:
             process.kill()

@@ -1,7 +1,6 @@
-"""The worker that decodes: started where modules are files, of here or elsewhere, or bundled."""
+"""The worker that decodes: started where modules are files, and where none may be."""
 
 import shutil
-import subprocess
 from contextlib import ExitStack
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -14,21 +13,15 @@ from browsers import LONG
 SIZE = (64, 36)
 
 PAGE = """<!doctype html><meta charset="utf-8"><title>VDIs</title>
-<script type="module" src="{script}"></script>
+<script type="module" src="viewer/element.js"></script>
 <vdi-viewer src="ball.vdi"></vdi-viewer><vdi-viewer src="ball.vdi"></vdi-viewer>"""
-
-#: Commands that make ``out/main.js`` of ``main.js``, and what else it takes.
-BUNDLERS = {
-    "esbuild": "main.js viewer/worker.js --bundle --format=esm --outdir=out --entry-names=[name]",
-    "vite": "build --logLevel=error --base=./ --outDir=out",
-    "rollup": "main.js viewer/worker.js --dir out --silent",
-}
 
 
 @pytest.fixture
 def folder(data, tmp_path):
     """A folder with a VDI and the viewer's modules."""
     (tmp_path / "ball.vdi").write_bytes(data)
+    (tmp_path / "index.html").write_text(PAGE)
     with resources.as_file(resources.files("pyvista_vdi.extensions.web") / "viewer") as viewer:
         shutil.copytree(viewer, tmp_path / "viewer")
     return tmp_path
@@ -79,34 +72,10 @@ def workers_and_warnings(chromium, url):
 
 
 def test_modules_start_it_and_where_none_may_be_that_is_said_once(folder, serve, chromium):
-    """Of the page's own origin, of another one, and under policies."""
-    elsewhere = serve(folder, [("Access-Control-Allow-Origin", "*")])
-    for script, policy, starts in (
-        ("viewer/element.js", "default-src 'self'", True),
-        (f"{elsewhere}viewer/element.js", "", True),
-        ("viewer/element.js", "worker-src 'none'", False),
-    ):
-        (folder / "index.html").write_text(PAGE.format(script=script))
-        url = serve(folder, [("Content-Security-Policy", policy)] if policy else [])
+    for policy, starts in (("default-src 'self'", True), ("worker-src 'none'", False)):
+        url = serve(folder, [("Content-Security-Policy", policy)])
         workers, warnings = workers_and_warnings(chromium, url)
         assert bool(workers) == starts, policy
         assert len(warnings) == (not starts)
         assert all("decodes on the page's own thread" in text for text in warnings)
         assert all("worker-src" in text and "worker.js" in text for text in warnings)
-
-
-@pytest.mark.parametrize("bundler", BUNDLERS)
-def test_bundlers_take_it_with_them(bundler, folder, serve, chromium):
-    command = shutil.which(bundler)
-    if command is None:
-        pytest.skip(f"needs {bundler} in the path: npm install --global {bundler}")
-    (folder / "main.js").write_text('import "./viewer/element.js";\n')
-    (folder / "index.html").write_text(PAGE.format(script="./main.js"))
-    subprocess.run([command, *BUNDLERS[bundler].split()], cwd=folder, check=True, timeout=LONG)
-    out = folder / "out"
-    shutil.copy(folder / "ball.vdi", out)
-    if bundler != "vite":
-        shutil.copy(folder / "index.html", out)
-    workers, warnings = workers_and_warnings(chromium, serve(out))
-    assert workers
-    assert not warnings

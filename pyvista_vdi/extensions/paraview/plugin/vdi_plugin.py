@@ -406,7 +406,7 @@ class VDIReader(vtk_pipeline.VDIReader):
     def _execute(self, inputs: Any, outputs: Any) -> None:
         time = wanted_time(outputs.GetInformationObject(0)) or 0.0
         if self._files:  # the last file that is not after the time
-            self._path = self._files[min(max(int(time), 0), len(self._files) - 1)]
+            self._set["file_name"] = self._files[min(max(int(time), 0), len(self._files) - 1)]
         super()._execute(inputs, outputs)
         if len(self._files) > 1:
             image = vtkImageData.GetData(outputs, 0)

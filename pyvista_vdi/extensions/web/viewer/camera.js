@@ -1,6 +1,6 @@
 // Views as VTK's vtkCamera has them, and its movements: pure functions of plain objects.
 import { cameraAxes, isParallel } from "./rays.js";
-import { add, dot, subtract, times, unit } from "./vectors.js";
+import { add, dot, subtract, unit } from "./vectors.js";
 
 /** Return a view as the viewer keeps it: see element.d.ts; a TypeError says why one shows nothing. */
 export function checkedCamera(camera) {
@@ -54,17 +54,6 @@ function turned(vector, axis, degrees) {
     v * c + (z * u - x * w) * s + y * along,
     w * c + (x * v - y * u) * s + z * along,
   ];
-}
-
-/** Look at a box of the world from a direction, so that all of it is seen: VTK's ResetCamera. */
-export function lookingAt(camera, bounds, from, view_up) {
-  const [low, high] = [0, 1].map((end) => [0, 2, 4].map((k) => bounds[k + end]));
-  const focal_point = times(add(low, high), 0.5);
-  const radius = Math.hypot(...subtract(high, low)) / 2 || 1;
-  const { view_angle, parallel_scale } = camera;
-  const distance = radius / Math.sin(((isParallel(camera) ? 30 : view_angle) * Math.PI) / 360);
-  const lens = parallel_scale === undefined ? { view_angle } : { parallel_scale: radius };
-  return { position: add(focal_point, unit(from), distance), focal_point, view_up, ...lens };
 }
 
 const around = (camera, axis, degrees) => ({

@@ -5,17 +5,12 @@ const KNOTS = {
   gray: "AAAAAP////8",
   viridis: "AEQBVA5IFmgdSCl5LEQ7hDk+SolaLm2OgSCSjI8fn4iaI6mDqjW3ebxWxmfQhNRL7tLiG/bn5Bn//ecl",
   plasma: "AA0IhwsoBZIhTgKiNGwAqD99A6hHiAimWKAanG+7NIiG0U5yqu15U8r8ozji/cgn7PrYJPvy8if/8Pkh",
-  inferno: "AAAABAQCAQoSDQgpHRwMQys0Cl84SgxrSWUVbll/Hmxqmihle7QzWY/QRUWs72wjwPmOCcn8nwfV+7Ya5PfTQ" +
-    "Ozz41r08fF5//z/pA",
   turbo: "ADASOwY3JGYMPTWLEkFGrBhEVsceRmbdJEd27itGh/swQpT/Njqj/D0utPJFIMffSxrU0FAY3cJVGuS2WyXsp2I" +
     "49JFtYfxseIv/S4Ck/DyHt/c1kM3sNJzn1zmp+bw5t/6ZLMD7fiHI9GYX0uhLDNzYNwburxgB/3oEAw",
   coolwarm: "ADtMwBBOaNggYoLqMHea90CNsP5Qo8L+YLnQ+XDM2e2A3dzcj+vTxp/0xa2v97GUv/Sae9flcFjvyz4498Ao" +
     "L/+0BCY",
   bone: "AAAAAF1RUXG+psbG/////w",
   hot: "AAsAAF3/AAC+//4A/////w",
-  copper: "AAAAAM7+oWb//8d/",
-  Blues: "APf7/0DG2+9gncrhgGqu1p9Cksa/IXG13whRnP8IMGs",
-  Reds: "AP/18CD+4NI//LyiYPyScn/7a0uf7zwsv8sYHd+lDxX/ZwAN",
 };
 
 /** The names. */

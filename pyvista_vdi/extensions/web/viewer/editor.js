@@ -7,14 +7,6 @@ const NUDGE = 0.01, STRIDE = 0.1;
 /** Pixels from a point within which a finger or a pointer takes it. */
 const NEAR = 14;
 
-/** Curves to begin with: shares of the window and opacities. */
-const PRESETS = {
-  Ramp: [0, 0, 1, 1],
-  Soft: [0, 0, 0.3, 0.03, 0.5, 0.2, 0.7, 0.5, 1, 0.8],
-  Peak: [0, 0, 0.4, 0, 0.5, 0.6, 0.6, 0, 1, 0],
-  Step: [0, 0, 0.49, 0, 0.51, 0.9, 1, 0.9],
-};
-
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
   Home: [-Infinity, 0], End: [Infinity, 0] };
 
@@ -139,14 +131,11 @@ export function transferEditor(viewer, button) {
 
   // -- all of it ---------------------------------------------------------------------------------
 
-  const row = (...content) => htmlElement("div", { className: "row" }, ...content);
   const removing = button("Remove the point", remove, "\u2212 Point");
   const element = htmlElement("div", { className: "editor" }, curve, colors,
     htmlElement("div", { className: "ends" }, lowest, said, highest),
-    row(button("Add a point", addBehind, "+ Point"), removing),
-    labelled("Colours", maps), labelled("Level", level), labelled("Window", window_),
-    row(...Object.entries(PRESETS).map(([name, points]) =>
-      button(`Opacity: ${name}`, () => change({ points }), name))));
+    htmlElement("div", { className: "row" }, button("Add a point", addBehind, "+ Point"), removing),
+    labelled("Colours", maps), labelled("Level", level), labelled("Window", window_));
 
   const textOf = ([x, y]) => `value ${inShort(valueOf(x))}, opacity ${y}`;
   const showPoints = () => {

@@ -47,8 +47,6 @@ export interface ViewerStatus {
   message?: string;
   supersegments?: number;
   lists?: [number, number];
-  level?: string;
-  precision?: string;
   pixels: number;
 }
 
@@ -82,17 +80,15 @@ export class VDIViewer extends HTMLElement {
   set clippingPlanes(planes: Iterable<ClippingPlane>);
   scene: Scene | null;
   time: number | null;
-  readonly bounds: number[] | null;
   readonly values: ViewerValues | null;
   readonly transferFunction: { colors: Vector[]; scalar_range: [number, number] } | null;
   readonly status: ViewerStatus;
   readonly series: { times: number[]; length: number; nearest(time: number): number } | null;
   readonly set: { length: number; nearest: number } | null;
   readonly playing: boolean;
-  play(options?: { rate?: number; loop?: boolean }): void;
+  play(options?: { rate?: number }): void;
   pause(): void;
   resetCamera(): void;
-  pointAt(x: number, y: number): Vector | null;
   load(source: string | URL | Uint8Array | Blob | ReadableStream): Promise<VDIViewer>;
   screenshot(size?: { width?: number; height?: number }): Promise<ViewerPicture>;
   addEventListener<K extends keyof ViewerEventMap>(

@@ -7,13 +7,12 @@ import { followAddress } from "./link.js";
 import { embedded, load } from "./loader.js";
 import { AS_MADE, checkedLook } from "./look.js";
 import { Player, playerControls } from "./player.js";
-import { frameOf, isParallel } from "./rays.js";
+import { isParallel } from "./rays.js";
 import { Renderer } from "./renderer.js";
 import { MOST_CLIPPING_PLANES } from "./shader.js";
 import { styleSheet } from "./style.js";
 import { Surround } from "./surround.js";
 import { editedFrom, startOf, toldOf } from "./values.js";
-import { dot } from "./vectors.js";
 
 /** Milliseconds between two looks at how dense the screen's pixels are. */
 const DENSITY = 500;
@@ -41,7 +40,6 @@ export class VDIViewer extends HTMLElement {
   #series = null;
   #player = null; // of a series, or what chooses of a set
   #linked = false; // whether the view came from the page's address
-  #wantedTime = null; // of a series, from there
   #address = null;
   #bar = null; // controls of turning
   #controls = null; // and of playing
@@ -65,8 +63,7 @@ export class VDIViewer extends HTMLElement {
     };
     root.append(htmlElement("div", { className: "box" }, ...Object.values(parts)));
     this.#shown = new Renderer(this, parts, {
-      busy: () => this.playing, drawn: (full, latest) => this.#drawn(full, latest),
-      failed: (error) => this.#fail(error),
+      drawn: (full, latest) => this.#drawn(full, latest), failed: (error) => this.#fail(error),
     });
     this.#ready.promise.catch(() => {}); // who awaits it is told; nobody need
   }
@@ -163,16 +160,6 @@ export class VDIViewer extends HTMLElement {
     this.#shown.invalidate();
   }
 
-  /** A box of the world that the VDI is in: low and high of x, y and z; null without a VDI. */
-  get bounds() {
-    if (!this.#shown.prepared) return null;
-    const { linear, offset, half, scale } = frameOf(this.#shown.prepared);
-    return linear.flatMap((row, k) => {
-      const reach = dot(row.map(Math.abs), half);
-      return [offset[k] - reach, offset[k] + reach].map((x) => x / scale);
-    });
-  }
-
   /** Of values that a VDI keeps the `range`, a `histogram` by length and the `start` of editing. */
   get values() {
     const { prepared, scene } = this.#shown, { values } = prepared ?? {};
@@ -189,11 +176,6 @@ export class VDIViewer extends HTMLElement {
     return told?.colors?.length && told.scalar_range ? told : null;
   }
 
-  /** A point of the world under a place of the picture, CSS pixels; null where little is seen. */
-  pointAt(x, y) {
-    return this.#shown.pointAt(x, y);
-  }
-
   /** The picture at full quality: premultiplied RGBA, 8 bits, top row first, without background. */
   async screenshot({ width = this.#shown.size[0], height = this.#shown.size[1] } = {}) {
     await this.ready;
@@ -202,9 +184,8 @@ export class VDIViewer extends HTMLElement {
 
   /** What is going on: state ("empty", "loading", "coarse", "full", "error"), progress, ... */
   get status() {
-    const { n, windowSize, level, precision } = this.#shown.prepared ?? {};
-    const { pixels } = this.#shown;
-    return { ...this.#status, supersegments: n, lists: windowSize, level, precision, pixels };
+    const { n, windowSize } = this.#shown.prepared ?? {};
+    return { ...this.#status, supersegments: n, lists: windowSize, pixels: this.#shown.pixels };
   }
 
   // -- where it comes from -----------------------------------------------------------------------
@@ -241,11 +222,6 @@ export class VDIViewer extends HTMLElement {
     this.#show(prepared);
     // Look at what an address gives, where it lies elsewhere than what it gave before
     if (before && before.some((edge, k) => edge !== prepared.bounds[k])) this.resetCamera();
-  }
-
-  /** Show the bytes of a .vdi file; what is there stays until they are decoded. */
-  showBytes(bytes) {
-    return this.load(bytes);
   }
 
   // Show what prepare.js has made of a VDI: swapped whole.
@@ -338,7 +314,8 @@ export class VDIViewer extends HTMLElement {
 
   set time(time) {
     if (!Number.isFinite(time)) throw new TypeError(`A time is a number; got ${time}.`);
-    this.#seek(this.#played().nearest(time));
+    this.#player.step = this.#played().nearest(time);
+    if (this.#player.settled && this.#status.state === "error") this.#recover();
   }
 
   /** Whether one step is shown after the other. */
@@ -346,7 +323,7 @@ export class VDIViewer extends HTMLElement {
     return this.#player?.playing ?? false;
   }
 
-  /** Show one step after the other, `{rate, loop}`: so many a second, and from the first again. */
+  /** Show one step after the other, `{rate}`: so many a second, and from the first again. */
   play(options) {
     this.#played();
     this.#player.play(options);
@@ -375,40 +352,24 @@ export class VDIViewer extends HTMLElement {
         if (player !== this.#player) return;
         if (!player.playing) this.#awaitStep();
         this.#controls?.show();
-        this.#address?.changed();
       },
       failed: (error) => player === this.#player && this.#fail(error),
     });
     series.changed = () => {
       this.#controls?.show();
       if (series.views) player.resume();
-      this.#comeToTime();
     };
     [this.#controls, this.#bar].forEach((each) => each?.show());
-    const plays = this.hasAttribute("autoplay") && !lessMotion().matches && this.#wantedTime === null;
     if (!series.views) {
-      this.#comeToTime();
-      if (plays) player.play();
+      if (this.hasAttribute("autoplay") && !lessMotion().matches) player.play();
     } else if (this.#shown.camera) player.look(this.#shown.camera);
     else this.resetCamera();
-  }
-
-  // Until the step of the time that a link says has come, show the nearest.
-  #comeToTime() {
-    if (this.#wantedTime === null || !this.series) return;
-    this.#seek(this.#series.nearest(this.#wantedTime));
-    if (this.#series.complete || this.time === this.#wantedTime) this.#wantedTime = null;
   }
 
   #endSeries() {
     this.#player?.close();
     this.#player = this.#series = null;
     this.#controls?.show();
-  }
-
-  #seek(step) {
-    this.#player.step = step;
-    if (this.#player.settled && this.#status.state === "error") this.#recover();
   }
 
   // The element is ready again when a step that is asked for, or about to be drawn, is drawn.
@@ -425,11 +386,6 @@ export class VDIViewer extends HTMLElement {
       this.#linked = !this.#shown.scene?.head;
       this.camera = state.camera;
     } else this.resetCamera();
-    const time = state?.time ?? null;
-    if (this.series) {
-      this.pause();
-      this.#seek(time === null ? 0 : this.#series.nearest(time));
-    } else this.#wantedTime = time;
   }
 
   // -- life --------------------------------------------------------------------------------------
@@ -500,7 +456,7 @@ export class VDIViewer extends HTMLElement {
     }
   }
 
-  // Hear of what people do, of the canvas' size and of whether it is in sight.
+  // Hear of what people do, and of the canvas' size.
   #listen(signal) {
     const viewer = this, shown = this.#shown, { canvas } = this.#parts;
     interact(canvas, {
@@ -516,17 +472,15 @@ export class VDIViewer extends HTMLElement {
     }, signal);
     hearKeys(this.shadowRoot, (event, target) => this.#key(event, target), signal);
     lessMotion().addEventListener("change", ({ matches }) => matches && this.pause(), { signal });
-    const sizes = new ResizeObserver(() => shown.resize());
-    for (const each of [canvas, document.documentElement]) sizes.observe(each);
-    const sight = new IntersectionObserver((entries) => {
+    const sizes = new ResizeObserver(() => {
       this.#share();
-      shown.see(entries.at(-1).isIntersecting);
-    }, { rootMargin: "50%" });
-    sight.observe(this);
+      shown.resize();
+    });
+    for (const each of [canvas, document.documentElement]) sizes.observe(each);
     // Another screen, or the browser's zoom: not all ways to change it are told
     const density = setInterval(() => shown.resize(), DENSITY);
     signal.addEventListener("abort", () => {
-      [sizes, sight].forEach((each) => each.disconnect());
+      sizes.disconnect();
       clearInterval(density);
     });
   }

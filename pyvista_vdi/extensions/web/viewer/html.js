@@ -32,5 +32,8 @@ export function setSlider(made, value, words) {
   made.setAttribute("aria-valuetext", words);
 }
 
+/** Keys that sliders and lists take by themselves. */
+export const OF_SLIDERS = /^(Arrow|Page|Home|End)/;
+
 /** A number as people read it. */
 export const inShort = (x) => String(Number(x.toPrecision(4)));

@@ -8,7 +8,7 @@ import { BEGIN, Series, beginsAsSeries } from "./series.js";
  *
  * @param {string|URL|Uint8Array|ArrayBuffer|Blob|ReadableStream|AsyncIterable} source A .vdi, .vdis
  *   or .vdiset file: where it is, its bytes, or its pieces, which may be base64 text as
- *   {@link embedded} gives it. Or where the folder of a series is, with a slash behind it.
+ *   {@link embedded} gives it.
  * @param {object} options `onLevel(prepared)` is called with each level as prepare.js makes it,
  *   `onSeries(series)` in its place, as soon as it has a VDI; `onProgress(share)` with what is read
  *   of 1. `signal` ends it: nothing is called any more.
@@ -21,13 +21,6 @@ export async function load(source, { onLevel, onSeries, onProgress = () => {},
   let pieces = null;
   try {
     const { reading } = await withWorker(signal, async (ask) => {
-      const folder = onSeries && seriesFolder(source);
-      if (folder) {
-        series(await Series.ofFolder(folder.name, async (file) =>
-          new Uint8Array(await (await fetched(new URL(file, folder.url))).arrayBuffer())));
-        progress(1);
-        return {};
-      }
       pieces = piecesOf(source, progress, signal);
       const head = new GrowingBytes(); // which tells what it is
       for (let next; head.whole.length < BEGIN || head.broken; head.push(next.value)) {
@@ -102,14 +95,6 @@ async function* piecesOf(source, onProgress, signal) {
   } finally {
     reader.cancel().catch(() => {});
   }
-}
-
-// Where a folder with a series, or with a set, is, and the JSON in it; undefined for other sources.
-function seriesFolder(source) {
-  if (!(typeof source === "string" || source instanceof URL)) return undefined;
-  const url = URL.canParse(source, document.baseURI) && new URL(source, document.baseURI);
-  const kind = url && /\.(vdis|vdiset)\/$/i.exec(url.pathname)?.[1].toLowerCase();
-  return kind && { url, name: kind === "vdis" ? "series.json" : "set.json" };
 }
 
 async function fetched(url, signal) {

@@ -1,13 +1,11 @@
 // Which step of a series is shown, and when; steps are decoded ahead, in a worker.
-import { htmlElement, setSlider, slider } from "./html.js";
+import { OF_SLIDERS, htmlElement, setSlider, slider } from "./html.js";
 import { Ahead } from "./series.js";
 
 /** Steps per second of films. */
 const RATE = 24;
 /** Steps that are decoded before their time comes. */
 const STEPS_AHEAD = 3;
-/** Keys that a slider takes by itself. */
-const OF_SLIDERS = /^(Arrow|Page|Home|End)/;
 
 /** Shows one step of a series after the other, at a rate, leaving out what is not ready. */
 export class Player {
@@ -20,7 +18,6 @@ export class Player {
   #from = 0;
   #playing = false;
   #rate = RATE;
-  #loop = true;
   #frame = 0; // that is asked for
 
   /**
@@ -65,15 +62,13 @@ export class Player {
     return this.#playing;
   }
 
-  /** Go on from the step that is shown, or from the first where the last one is. */
-  play({ rate = RATE, loop = true } = {}) {
+  /** Go on from the step that is shown, behind the last one from the first. */
+  play({ rate = RATE } = {}) {
     if (!(rate > 0 && rate < Infinity)) {
       throw new RangeError(`A rate is steps per second, above 0; got ${rate}.`);
     }
-    const { step } = this;
-    [this.#rate, this.#loop] = [rate, loop];
-    this.#place = !loop && step === this.#series.length - 1 ? 0 : step;
-    [this.#from, this.#since] = [this.#place, null];
+    [this.#rate, this.#place, this.#since] = [rate, this.step, null];
+    this.#from = this.#place;
     this.#playing = true;
     this.resume(); // what could not be fetched may come now
     this.#nextFrame();
@@ -107,44 +102,24 @@ export class Player {
     if (!this.#playing) return;
     const now = performance.now() / 1000, n = this.#series.length;
     this.#since ??= now;
-    const due = this.#dueAt(now);
+    // The place whose time has come; the first step follows the last when all have come
+    const place = this.#from + Math.floor((now - this.#since) * this.#rate);
+    const due = this.#series.complete ? place : Math.min(place, n - 1);
     // Further back than a round the same steps come again
-    for (let place = due; place > Math.max(this.#place, due - n); --place) {
-      if (this.#ahead.ready.has(place % n)) {
-        this.#place = place;
-        this.#ahead.show(place % n);
-        this.#changed();
-        break;
-      }
-    }
-    if (this.#ended()) {
-      this.pause();
-      return;
+    for (let at = due; at > Math.max(this.#place, due - n); --at) {
+      if (!this.#ahead.ready.has(at % n)) continue;
+      this.#place = at;
+      this.#ahead.show(at % n);
+      this.#changed();
+      break;
     }
     const first = Math.max(this.#place, due) + 1;
     const next = Array.from({ length: STEPS_AHEAD }, (_, k) => first + k);
-    const coming = next.filter((place) => this.#loops || place < n).map((place) => place % n);
+    const coming = next.filter((place) => this.#series.complete || place < n).map((place) => place % n);
     this.#ahead.want(this.settled ? coming : [this.step, ...coming]);
     this.#nextFrame();
   }
 
-  // The place whose time has come.
-  #dueAt(now) {
-    const place = this.#from + Math.floor((now - (this.#since ?? now)) * this.#rate);
-    return this.#loops ? place : Math.min(place, this.#series.length - 1);
-  }
-
-  // Whether the first step follows the last: not while there are steps to come.
-  get #loops() {
-    return this.#loop && this.#series.complete;
-  }
-
-  #ended() {
-    if (this.#loop || !this.#series.complete) return false;
-    let last = this.#series.length - 1;
-    while (last > this.#place && this.#ahead.broken.has(last)) --last;
-    return this.#place >= last;
-  }
 }
 
 /**

@@ -1,6 +1,6 @@
 // The workers that decode, or what stands for one on the page's own thread.
 import { VDIFileError } from "./bytes.js";
-import { waysToSpawn } from "./spawn.js";
+import { spawn } from "./spawn.js";
 import { serve } from "./worker.js";
 
 /** Files that are decoded at a time, as many as browsers fetch at a time. */
@@ -57,26 +57,23 @@ function giveBack(port, works) {
 
 // A worker that listens, or what stands for one on this thread where none may be started.
 async function started() {
-  const causes = new Set();
-  for (const spawn of waysToSpawn) {
-    let worker = null;
-    try {
-      worker = spawn();
-      await new Promise((resolve, reject) => {
-        worker.onmessage = resolve;
-        worker.onerror = reject;
-        setTimeout(reject, PATIENCE, new Error(`it says nothing for ${PATIENCE / 1000} s`));
-      });
-      return worker;
-    } catch (error) {
-      worker?.terminate();
-      causes.add(error.message || "its script cannot be loaded");
+  let worker = null;
+  try {
+    worker = spawn();
+    await new Promise((resolve, reject) => {
+      worker.onmessage = resolve;
+      worker.onerror = reject;
+      setTimeout(reject, PATIENCE, new Error(`it says nothing for ${PATIENCE / 1000} s`));
+    });
+    return worker;
+  } catch (error) {
+    worker?.terminate();
+    if (!warned) {
+      console.warn("<vdi-viewer> decodes on the page's own thread, as no worker starts: " +
+        `${error.message || "its script cannot be loaded"}. Does the page's policy allow it ` +
+        "(worker-src), and is worker.js beside the script (to some bundlers it is to be named as " +
+        "another entry)?");
     }
-  }
-  if (!warned) {
-    console.warn("<vdi-viewer> decodes on the page's own thread, as no worker starts: " +
-      `${[...causes].join("; ")}. Does the page's policy allow it (worker-src), and is worker.js ` +
-      "beside the script (to some bundlers it is to be named as another entry)?");
     warned = true;
   }
   const port = { onmessage: null, terminate() {} };

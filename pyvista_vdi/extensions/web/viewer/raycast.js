@@ -3,17 +3,15 @@ import { filledTexture, programOf } from "./graphics.js";
 import { AS_MADE } from "./look.js";
 import { TEXTURE_WIDTH } from "./prepare.js";
 import {
-  frameForms, frameOf, isParallel, pixelRays, pixelsOfBoxes, pointAlong,
+  frameForms, frameOf, isParallel, pixelRays, pixelsOfBoxes,
 } from "./rays.js";
-import { MOST_PLANES, VERTEX_SHADER, fragmentShader } from "./shader.js";
+import { VERTEX_SHADER, fragmentShader } from "./shader.js";
 import { MEAN_STEPS, SPREADS, fillTable } from "./values.js";
 
 /** A ray ends where less transmittance than this is left. */
 const TRANSMITTANCE_CUTOFF = 1e-6;
 /** Rows of pixels that are drawn at once. */
 const STRIP = 16;
-/** Opacity, of 255, below which a ray sees too little for its place to be asked for. */
-const LEAST_SEEN = 4;
 
 /** Draws prepared VDIs from any view into the bound framebuffer. */
 export class Raycaster {
@@ -67,13 +65,11 @@ export class Raycaster {
    * scissor that is set holds.
    *
    * Of the view the `camera` is VTK's, in world units, with a `model_transform` where the model lies
-   * elsewhere than it did for the VDI; the viewport is set to `width` and `height`, pixels, from a
-   * `corner`. `clippingPlanes`, world, keep the side of their normals; rays end at a `depthTexture`,
-   * R32F, view depths of what is opaque in world units, and where less transmittance than `cutoff` is
-   * left. `finds`: t of a ray's end is written, as four bytes of a float32.
+   * elsewhere than it did for the VDI; the viewport is set to `width` and `height`, pixels.
+   * `clippingPlanes`, world, keep the side of their normals; rays end at a `depthTexture`, R32F, view
+   * depths of what is opaque in world units.
    */
-  draw({ camera, width, height, corner = [0, 0], clippingPlanes = [], depthTexture = null,
-    look = AS_MADE, cutoff = TRANSMITTANCE_CUTOFF, finds = false }) {
+  draw({ camera, width, height, clippingPlanes = [], depthTexture = null, look = AS_MADE }) {
     const { gl, vdi } = this;
     if (!vdi) return;
     if (vdi.values) this.classify(look.transfer ?? null);
@@ -82,32 +78,26 @@ export class Raycaster {
     const rays = pixelRays(frame, camera, [width, height]);
     const { coordinates, planes } = frameForms(frame, space, windowSize, rays, isParallel(camera),
       clippingPlanes, look.clip);
-    if (planes.length > MOST_PLANES) {
-      throw new Error(`A VDI is clipped to at most ${clippingPlanes.length - planes.length +
-        MOST_PLANES} planes, not to ${clippingPlanes.length}.`);
-    }
     const defines = [vdi.packed && "PACKED", depthTexture && "OPAQUE", vdi.values && "VALUES"];
     const shader = fragmentShader(defines.filter(Boolean), planes.length);
     const { program, uniforms: u } = programOf(gl, VERTEX_SHADER, shader);
     gl.useProgram(program);
-    gl.viewport(...corner, width, height);
+    gl.viewport(0, 0, width, height);
     const halves = (forms) => [0, 3].map((k) => forms.flatMap((form) => form.slice(k, k + 3)));
     const [formValue, formSlope] = halves(coordinates), [planeValue, planeSlope] = halves(planes);
     const vectors = { formValue, formSlope, planeValue, planeSlope };
     for (const [name, value] of Object.entries(vectors)) gl.uniform3fv(u[name], value);
     const scalars = {
-      firstDepth: vdi.firstDepth, slabsPerDepth: vdi.slabsPerDepth, cutoff,
+      firstDepth: vdi.firstDepth, slabsPerDepth: vdi.slabsPerDepth, cutoff: TRANSMITTANCE_CUTOFF,
       brightness: look.brightness, thickness: look.opacity, codeStep: vdi.step,
       nearest: space.nearest, worldScale: frame.scale, reference: rays.reference,
     };
     for (const [name, value] of Object.entries(scalars)) gl.uniform1f(u[name], value);
     gl.uniform4fv(u.depths, space.depths);
     gl.uniform2fv(u.reciprocals, space.reciprocals);
-    gl.uniform2f(u.corner, ...corner);
     gl.uniform2f(u.middle, width / 2, height / 2);
     gl.uniformMatrix3fv(u.direction, false, rays.direction.flat());
     gl.uniform2i(u.window, ...windowSize);
-    gl.uniform1i(u.finds, Number(finds));
     const bound = depthTexture ? { ...vdi.textures, opaque: depthTexture } : vdi.textures;
     Object.entries(bound).forEach(([name, texture], unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
@@ -115,52 +105,23 @@ export class Raycaster {
       gl.uniform1i(u[name], unit);
     });
     gl.bindVertexArray(this.vertices);
-    this.drawStrips(pixelsOfBoxes(frame, camera, [width, height], vdi.boxes), corner, height);
+    this.drawStrips(pixelsOfBoxes(frame, camera, [width, height], vdi.boxes), height);
     gl.bindVertexArray(null);
     gl.activeTexture(gl.TEXTURE0);
   }
 
-  /**
-   * Where the ray of a pixel, from the lower left corner, has lost half of the light that it loses: a
-   * point of the world, or null where hardly anything is seen. Waits for the device, which draws into
-   * a target of a pixel.
-   */
-  pointAt(target, view, [x, y]) {
-    const { gl, vdi } = this, { camera, width, height } = view;
-    if (!vdi) return null;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-    gl.enable(gl.SCISSOR_TEST);
-    gl.scissor(0, 0, 1, 1);
-    gl.clearColor(0, 0, 0, 0);
-    const bytes = new Uint8Array(4);
-    const drawn = (more) => {
-      gl.clear(gl.COLOR_BUFFER_BIT);
-      this.draw({ ...view, corner: [-x, -y], ...more });
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-    };
-    drawn({});
-    const opacity = bytes[3] / 255, isSeen = bytes[3] > LEAST_SEEN;
-    if (isSeen) drawn({ cutoff: 1 - opacity / 2, finds: true });
-    gl.disable(gl.SCISSOR_TEST);
-    const t = new DataView(bytes.buffer).getFloat32(0, true);
-    if (!isSeen || !Number.isFinite(t)) return null;
-    const rays = pixelRays(vdi.frame, camera, [width, height]);
-    return pointAlong(vdi.frame, rays, [x + 0.5 - width / 2, y + 0.5 - height / 2], t);
-  }
-
   // Draw only where something may be seen: strip by strip, from the first to the last such pixel,
   // within the scissor that is set.
-  drawStrips(boxes, [left, bottom], height) {
+  drawStrips(boxes, height) {
     const { gl } = this;
     const set = gl.isEnabled(gl.SCISSOR_TEST) ? gl.getParameter(gl.SCISSOR_BOX) : null;
-    const [firstX, firstY, wide, high] = set ?? [left, bottom, Infinity, height];
+    const [firstX, firstY, wide, high] = set ?? [0, 0, Infinity, height];
     gl.enable(gl.SCISSOR_TEST);
     for (let row = 0; row < height; row += STRIP) {
       const here = boxes.filter(([, [y0, y1]]) => y0 < row + STRIP && y1 > row).map(([x]) => x);
-      const x0 = Math.max(left + Math.min(...here.map(([x]) => x)), firstX);
-      const x1 = Math.min(left + Math.max(...here.map(([, x]) => x)), firstX + wide);
-      const y0 = Math.max(bottom + row, firstY);
-      const y1 = Math.min(bottom + Math.min(row + STRIP, height), firstY + high);
+      const x0 = Math.max(Math.min(...here.map(([x]) => x)), firstX);
+      const x1 = Math.min(Math.max(...here.map(([, x]) => x)), firstX + wide);
+      const y0 = Math.max(row, firstY), y1 = Math.min(row + STRIP, height, firstY + high);
       if (!here.length || x0 >= x1 || y0 >= y1) continue;
       gl.scissor(x0, y0, x1 - x0, y1 - y0);
       gl.drawArrays(gl.TRIANGLES, 0, 3);

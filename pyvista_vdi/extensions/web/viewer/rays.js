@@ -167,12 +167,6 @@ export function modelPoint(rays, [a, b], t) {
   return add(from, towards, t);
 }
 
-/** The same in the world. */
-export function pointAlong(frame, rays, pixel, t) {
-  const point = modelPoint(rays, pixel, t);
-  return times(add(frame.linear.map((row) => dot(row, point)), frame.offset), 1 / frame.scale);
-}
-
 /**
  * Forms that a frame needs: list coordinates, and planes that rays are clipped to, of which those of
  * the world keep their normals' sides. `rays` and `parallel` are of the new view; `clip`: the part of

@@ -15,56 +15,37 @@ const REFUSED = 1008, UNSAID = 1006;
 /** Status of an ordinary request of the socket's address, and of one that is not let in. */
 const NO_SOCKET = 426, FORBIDDEN = 403;
 
-/**
- * The VDIs of a server, at the URL of a socket with the token, in a `<vdi-viewer>`.
- *
- * Events: `hello` (detail: what the server offers), `status` (detail: {doing, text}).
- */
-export class RemoteVDI extends EventTarget {
+/** The VDIs of a server, at the URL of a socket with the token, in a `<vdi-viewer>`. */
+class RemoteVDI {
   #socket = null;
   #incoming = null; // a VDI that comes, and how many of its bytes have
   #next = null; // the file of the last that has
   #showing = false;
-  #said = new Map(); // the last message of each kind, said again to a new connection
-  #resting = 0; // timers: until the view rests
-  #retrying = 0; // and until the connection is tried again
+  #step = 0; // said again to a new connection
+  #host;
+  #resting = 0; // a timer: until the view rests
   #retry = FIRST_RETRY;
-  #closing = new AbortController();
 
   /** What the server offers; null before it has said so. */
   hello = null;
   received = { vdis: 0, bytes: 0 };
 
-  constructor(viewer, url) {
-    super();
-    [this.viewer, this.url] = [viewer, url];
+  /** Of the host `offered(hello)` is called when the server has said so, `says(text)` for a line. */
+  constructor(viewer, url, host) {
+    [this.viewer, this.url, this.#host] = [viewer, url, host];
     const moved = () => {
       clearTimeout(this.#resting);
       this.#resting = setTimeout(() => this.#sendView(), VIEW_RESTS);
     };
-    const sizes = new ResizeObserver(moved), { signal } = this.#closing;
-    sizes.observe(viewer);
-    signal.addEventListener("abort", () => sizes.disconnect());
-    viewer.addEventListener("camerachange", moved, { signal });
+    new ResizeObserver(moved).observe(viewer);
+    viewer.addEventListener("camerachange", moved);
     this.#connect();
-  }
-
-  /** Change the transfer function: {cmap, opacity, clim}; what is left out is the server's. */
-  setLook(look) {
-    this.#say({ type: "look", ...look });
   }
 
   /** Show a time step, counted from 0. */
   setStep(step) {
-    this.#say({ type: "time", step });
-  }
-
-  /** End the connection for good. The viewer goes on drawing what it has. */
-  close() {
-    this.#closing.abort();
-    clearTimeout(this.#resting);
-    clearTimeout(this.#retrying);
-    this.#socket.close();
+    this.#step = step;
+    if (this.#isHeard) this.#send({ type: "time", step });
   }
 
   #connect() {
@@ -76,13 +57,11 @@ export class RemoteVDI extends EventTarget {
       else this.#take(new Uint8Array(data));
     };
     socket.onclose = async (event) => {
-      if (this.#closing.signal.aborted) return;
       const { why, forGood } = await whyNot(event, this.url);
-      if (this.#closing.signal.aborted) return;
       const again = forGood ? "" : `; trying again in ${Math.ceil(this.#retry / 1000)} s`;
-      this.#status(null, why + again);
+      this.#host.says(why + again);
       if (forGood) return;
-      this.#retrying = setTimeout(() => this.#connect(), this.#retry);
+      setTimeout(() => this.#connect(), this.#retry);
       this.#retry = Math.min(2 * this.#retry, LAST_RETRY);
     };
   }
@@ -93,16 +72,17 @@ export class RemoteVDI extends EventTarget {
       if (this.hello === null) viewer.home = message.camera;
       viewer.camera ??= message.camera; // where no link has said another
       this.hello = message;
-      this.#status(null, "");
-      this.dispatchEvent(new CustomEvent("hello", { detail: message })); // a panel may take room
-      this.#said.forEach((said) => this.#send(said));
+      this.#host.says("");
+      this.#host.offered(message); // a panel may take room
+      if (this.#step) this.setStep(this.#step);
       this.#sendView();
     } else if (message.type === "vdi") {
       this.#retry = FIRST_RETRY; // not at once: a server may fail whenever it is asked for one
       // One that has not come whole is given up by the server
       this.#incoming = { file: new Uint8Array(message.bytes), filled: 0 };
-    } else if (message.type === "status") this.#status(message.doing, "");
-    else if (message.type === "error") this.#status(null, message.message);
+    } else if (message.type === "status") {
+      this.#host.says(message.doing === "vdi" ? "making a VDI of this view" : "");
+    } else if (message.type === "error") this.#host.says(message.message);
   }
 
   #take(part) {
@@ -125,7 +105,7 @@ export class RemoteVDI extends EventTarget {
         await this.viewer.load(file);
         this.received.vdis += 1;
       } catch (error) {
-        this.#status(null, error.message);
+        this.#host.says(error.message);
       }
     }
     this.#showing = false;
@@ -149,15 +129,6 @@ export class RemoteVDI extends EventTarget {
   #send(message) {
     this.#socket.send(JSON.stringify(message));
   }
-
-  #say(message) {
-    this.#said.set(message.type, message);
-    if (this.#isHeard) this.#send(message);
-  }
-
-  #status(doing, text) {
-    this.dispatchEvent(new CustomEvent("status", { detail: { doing, text } }));
-  }
 }
 
 // Why there is no connection, and whether there will be none. Of a socket that is refused a browser
@@ -176,68 +147,23 @@ async function whyNot({ code, reason }, url) {
   }
 }
 
-// Plain controls of what the server offers; `complain` is told what is wrong.
-function controlsOf(remote, { cmaps, opacities, look, range, steps }, complain) {
-  const labelled = (text, ...inputs) => htmlElement("label", {}, text, ...inputs);
-  const choice = (label, names, value) => {
-    const known = names.includes(value);
-    const option = (name, more) => htmlElement("option", more, name);
-    const select = htmlElement("select", { label }, ...(known ? [] : [option("as started", { value: "" })]),
-      ...names.map((name) => option(name)));
-    select.value = known ? value : "";
-    return select;
-  };
-  const controls = [];
-  if (cmaps.length > 0) {
-    const cmap = choice("Colours", cmaps, look.cmap), opacity = choice("Opacity", opacities, look.opacity);
-    const ends = range.map((value, k) => htmlElement("input", { type: "number", step: "any",
-      placeholder: String(value), label: `${["Lowest", "Highest"][k]} value of the range` }));
-    let clim; // the last that was one
-    const tell = ({ target }) => {
-      const [low, high] = ends.map((end, k) => (end.value ? Number(end.value) : range[k]));
-      const wrong = ends.some((end) => end.validity.badInput) ? "the range is two numbers" : low < high
-        ? "" : `the range is from the lower value to the higher: ${low} is not below ${high}`;
-      for (const end of ends) {
-        end.setCustomValidity(wrong);
-        end.setAttribute("aria-invalid", wrong !== "");
-      }
-      complain(wrong);
-      if (wrong && ends.includes(target)) return;
-      if (!wrong) clim = ends.some((end) => end.value) ? [low, high] : undefined;
-      const wanted = Object.entries({ cmap: cmap.value, opacity: opacity.value, clim });
-      remote.setLook(Object.fromEntries(wanted.filter(([, value]) => value)));
-    };
-    for (const input of [cmap, opacity, ...ends]) input.addEventListener("change", tell);
-    // What is wrong is right as soon as it is: of letters that are deleted there is no change
-    for (const end of ends) end.addEventListener("input", (event) => end.validity.valid || tell(event));
-    controls.push(labelled("Colours", cmap), labelled("Opacity", opacity), labelled("Range", ...ends));
-  }
-  if (steps > 1) {
-    const limits = { min: 0, max: steps - 1, value: 0 };
-    controls.push(labelled("Time", slider("Time step", limits, (step) => remote.setStep(step))));
-  }
-  return controls;
-}
-
 /** Connect a page's viewer to the server that the page came from; return the connection. */
 export function connectPage(viewer, panel, line) {
   const url = new URL("socket", location.href);
   url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
   url.search = location.search;
-  const remote = new RemoteVDI(viewer, url.href);
-  const said = { wrong: "", going: "" };
-  const say = (what) => {
-    Object.assign(said, what);
-    line.textContent = [said.wrong, said.going].filter(Boolean).join("; ");
-  };
-  let offered = "";
-  remote.addEventListener("hello", ({ detail }) => {
-    const offer = JSON.stringify(detail);
-    if (offered && offer !== offered) location.reload(); // another volume is served there by now
-    else if (!offered) panel.replaceChildren(...controlsOf(remote, detail, (wrong) => say({ wrong })));
-    offered = offer;
+  let known = "";
+  const remote = new RemoteVDI(viewer, url.href, {
+    says: (text) => (line.textContent = text),
+    offered(hello) {
+      const offer = JSON.stringify(hello), limits = { min: 0, max: hello.steps - 1, value: 0 };
+      if (known && offer !== known) location.reload(); // another volume is served there by now
+      else if (!known && hello.steps > 1) {
+        const time = slider("Time step", limits, (step) => remote.setStep(step));
+        panel.replaceChildren(htmlElement("label", {}, "Time", time));
+      }
+      known = offer;
+    },
   });
-  remote.addEventListener("status", ({ detail: { text, doing } }) =>
-    say({ going: text || (doing === "vdi" ? "making a VDI of this view" : "") }));
   return remote;
 }

@@ -7,8 +7,6 @@ import { Raycaster } from "./raycast.js";
 
 /** Milliseconds after the last movement from which a view rests, and is drawn with all pixels. */
 const REST = 150;
-/** Milliseconds without a frame after which a viewer out of sight keeps its picture alone. */
-const IDLE = 1000;
 /** Milliseconds after which what is not drawn is drawn with other graphics than those lost. */
 const LOST = 250;
 
@@ -38,14 +36,11 @@ export class Renderer {
   #drawing = false;
   #asked = false;
   #wake = () => {};
-  #seen = true;
-  #shots = 0; // pictures that are being made
-  #retiring = 0; // a timer
 
   /**
    * What draws into a viewer's canvas, and a scene's texts into the one over it. Of the host
-   * `busy()` says whether there will be frames without end; `drawn(full, latest)` is called after a
-   * frame: whether with all pixels, and of what is to be shown by now; `failed(error)`.
+   * `drawn(full, latest)` is called after a frame: whether with all pixels, and of what is to be shown
+   * by now; `failed(error)`.
    */
   constructor(viewer, { canvas, over }, host) {
     [this.#viewer, this.#canvas, this.#over, this.#host] = [viewer, canvas, over, host];
@@ -78,7 +73,6 @@ export class Renderer {
 
   /** Give back what is in the graphics' memory; the canvas keeps its picture. */
   release() {
-    clearTimeout(this.#retiring);
     this.#raycaster?.dispose();
     this.#pacer?.dispose();
     this.scene?.dispose();
@@ -95,20 +89,6 @@ export class Renderer {
   lost() {
     this.release();
     if (this.#drawing || this.#asked) setTimeout(() => this.invalidate(false), LOST);
-  }
-
-  /** Take note of whether the viewer is in sight. */
-  see(seen) {
-    this.#seen = seen;
-    if (seen && !this.#raycaster) this.invalidate(false);
-    this.#retire();
-  }
-
-  #retire() {
-    clearTimeout(this.#retiring);
-    if (this.#seen) return;
-    const busy = () => this.#drawing || this.#shots || this.#host.busy();
-    this.#retiring = setTimeout(() => busy() || this.release(), IDLE);
   }
 
   /** Take the size that the viewer has on this screen. */
@@ -184,7 +164,6 @@ export class Renderer {
     } finally {
       this.#drawing = false;
       if (this.#asked && this.#raycaster) this.invalidate(false);
-      this.#retire();
     }
   }
 
@@ -223,7 +202,7 @@ export class Renderer {
     return this.aspect ? fitted(camera, this.aspect, [width, height]) : camera;
   }
 
-  // -- pictures and points -----------------------------------------------------------------------
+  // -- pictures ------------------------------------------------------------------------------
 
   /** The picture at full quality: premultiplied RGBA, top row first. */
   async screenshot(width, height) {
@@ -239,7 +218,6 @@ export class Renderer {
     }
     if (!this.#drawing) this.#give();
     const target = pacer.target(width, height);
-    ++this.#shots;
     try {
       require(await pacer.inBands(target, width, height, this.#painter([width, height])));
       const data = new Uint8ClampedArray(4 * width * height), row = 4 * width;
@@ -253,23 +231,6 @@ export class Renderer {
       return { width, height, data };
     } finally {
       pacer.free(target);
-      --this.#shots;
-      this.#retire();
-    }
-  }
-
-  /** The point of the world under a place of the picture, CSS pixels; null where nothing is. */
-  pointAt(x, y) {
-    const [width, height] = this.size, { clientWidth, clientHeight } = this.#canvas;
-    if (!this.#raycaster || this.scene || !this.camera) return null;
-    const { look, clippingPlanes } = this, camera = this.fitted(this.camera, width, height);
-    const [column, row] = [x * width / clientWidth, y * height / clientHeight].map(Math.floor);
-    const target = this.#pacer.target(1, 1); // of its own: a frame may be half drawn
-    try {
-      return this.#raycaster.pointAt(target, { camera, width, height, clippingPlanes, look },
-        [column, height - 1 - row]);
-    } finally {
-      this.#pacer.free(target);
     }
   }
 }

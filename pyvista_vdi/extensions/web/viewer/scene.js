@@ -333,22 +333,10 @@ function uploaded(gl, attributes) {
 
 // -- in a page -----------------------------------------------------------------------------------
 
-/** Have the views with the same `data-link` turn with one, as those of a plotter do. */
-export function turnTogether(viewer) {
-  viewer.addEventListener("camerachange", ({ detail }) => {
-    const text = JSON.stringify(detail.camera);
-    for (const other of document.querySelectorAll(`[data-link="${viewer.dataset.link}"]`)) {
-      if (JSON.stringify(other.camera) !== text) other.camera = detail.camera;
-    }
-  });
-}
-
 function takeEmbedded() {
   for (const viewer of document.querySelectorAll("vdi-viewer")) {
     const script = viewer.querySelector(':scope > script[type="application/vdi-scene+base64"]');
-    if (!script || viewer.scene) continue;
-    viewer.scene = new Scene(bytesOfBase64(script.textContent));
-    if (viewer.dataset.link) turnTogether(viewer);
+    if (script && !viewer.scene) viewer.scene = new Scene(bytesOfBase64(script.textContent));
   }
 }
 

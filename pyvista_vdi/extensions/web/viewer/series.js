@@ -1,4 +1,4 @@
-// A series or a set in a page: a JSON and numbered .vdi files, in a ZIP or a folder (docs/series.md).
+// A series or a set in a page: a JSON and numbered .vdi files in a ZIP (docs/series.md).
 import { GrowingBytes, REMEDY, VDIFileError } from "./bytes.js";
 import { checkedMember, isCamera, membersOf } from "./decode.js";
 import { withWorker } from "./port.js";
@@ -103,17 +103,6 @@ export class Series {
       throw new VDIFileError("the series has no whole VDI: it was cut off, or none is written yet");
     }
     series.#take(places.length, true);
-  }
-
-  /**
-   * Return the series or set in a folder, of which each VDI is read when it is asked for: by `name`,
-   * "series.json" or "set.json", and by `read`, which returns the bytes of one of its files.
-   */
-  static async ofFolder(name, read) {
-    const series = new Series(name, await read(name), (i) => read(nameOf(i)));
-    if (!series.#times.length) throw new VDIFileError("the series has no step yet");
-    series.#take(Infinity, true);
-    return series;
   }
 }
 

@@ -10,10 +10,8 @@
 import { STACK_SHIFT, TEXTURE_WIDTH } from "./prepare.js";
 import { FIRST_SPREAD, MEAN_STEPS, SPREADS } from "./values.js";
 
-/** Planes of the user's that a ray can be clipped to. */
+/** Planes of the user's, and of a scene's VDI, that a ray can be clipped to: WebGL has room for them. */
 export const MOST_CLIPPING_PLANES = 24;
-/** All of them: a scene's for a VDI, box, viewport, eyes and slab, too. WebGL has room for them. */
-export const MOST_PLANES = 14 + 2 * MOST_CLIPPING_PLANES;
 
 /** A triangle that covers the viewport. */
 export const VERTEX_SHADER = `#version 300 es
@@ -42,7 +40,7 @@ ${SOURCE.replace("CLIPPING", clipping.join("\n"))}`;
 }
 
 const SOURCE = `
-uniform vec2 corner, middle;      // of the viewport, and half its size: pixels
+uniform vec2 middle;              // half the viewport's size, pixels
 uniform vec3 formValue[4], formSlope[4]; // u, v, depth coordinate, denominator: for 1, a and b
 uniform vec3 planeValue[PLANES], planeSlope[PLANES];
 uniform mat3 direction;           // model' length per t: columns for 1, a and b
@@ -52,7 +50,6 @@ uniform vec2 reciprocals;         // and 1 / Z of a depth coordinate
 uniform float firstDepth, slabsPerDepth; // of the occupancy grid, offsets from the depth origin
 uniform float cutoff;
 uniform float brightness, thickness; // factors of colours and of optical depths
-uniform bool finds;               // where the ray ends, in place of what it sees
 uniform usampler2D lists, masks;
 #ifdef PACKED
 uniform usampler2D faces;         // both words of a supersegment
@@ -216,7 +213,7 @@ void clip(vec3 pixel, vec3 atValue, vec3 atSlope) {
 
 void main() {
   seen = vec4(0.0);
-  vec3 pixel = vec3(1.0, gl_FragCoord.xy - corner - middle);
+  vec3 pixel = vec3(1.0, gl_FragCoord.xy - middle);
 #ifdef OPAQUE
   t1 = min(t1, texelFetch(opaque, ivec2(gl_FragCoord.xy), 0).x * worldScale - reference);
 #endif
@@ -332,16 +329,6 @@ CLIPPING
       }
       entered = !stays;
     }
-  }
-  if (finds) { // t, as the bits of a float32: where the ray meets the supersegment that ended it
-    if (n > 0 && low == n) --n; // it has been passed
-    if (n < count && perDepth != 0.0) {
-      r = clamp((facesMet(n).x - sense * deep.z) * perDepth, r, rEnd);
-    }
-    float share = r + 1.0 - rEnd, first = reciprocal(start.z), last_ = reciprocal(end.z);
-    float t = t0 + (t1 - t0) * share * last_ / (first + share * (last_ - first));
-    seen = vec4(uvec4(floatBitsToUint(t)) >> uvec4(0, 8, 16, 24) & 255u) / 255.0;
-    return;
   }
   if (brightness != 1.0) color = min(color * brightness, vec3(1.0 - left));
   seen = vec4(color, 1.0 - left);

@@ -37,15 +37,13 @@ progress { position: absolute; inset: auto 0 0 0; width: 100%; height: 3px; bord
 .panel { position: absolute; top: 48px; right: 6px; box-sizing: border-box; width: 300px;
   max-height: calc(100% - 54px); overflow: auto; padding: 8px 12px; }
 .panel button { border: 1px solid var(--edge); }
-.panel :is(.views, .row) { display: flex; gap: 4px; margin: 4px 0; }
-.panel :is(.views, .row) button { flex: 1; min-width: 0; padding: 0 2px; }
+.panel .row { display: flex; gap: 4px; margin: 4px 0; }
+.panel .row button { flex: 1; min-width: 0; padding: 0 2px; }
 .panel :is(label, fieldset) { display: flex; gap: 8px; align-items: center; min-width: 0;
   min-height: 32px; margin: 0; padding: 0; border: 0; }
 .panel legend { float: inline-start; min-width: 80px; padding: 0; }
 .panel label > span:first-child { min-width: 80px; }
 .panel input { flex: 1; width: 0; min-width: 0; height: 32px; margin: 0; accent-color: var(--mark); }
-.panel dl { display: grid; grid-template-columns: 3fr 2fr; gap: 4px 12px; margin: 8px 0 4px; }
-.panel dd { margin: 0; }
 
 .curve { position: relative; height: 120px; margin: 6px 0; touch-action: none; cursor: crosshair;
   box-shadow: 0 0 0 1px var(--edge); }

@@ -1,6 +1,5 @@
 // What somebody writes with the viewer's types: tsc checks it, and the types themselves. It is not run.
 import { VDIViewer, type ViewerCamera } from "../../../../pyvista_vdi/extensions/web/viewer/element";
-import { connectPage } from "../../../../pyvista_vdi/extensions/web/viewer/remote";
 import { Scene } from "../../../../pyvista_vdi/extensions/web/viewer/scene";
 
 const viewer = document.querySelector("vdi-viewer")!;
@@ -12,7 +11,6 @@ viewer.scene = new Scene(new Uint8Array(8));
 viewer.addEventListener("camerachange", ({ detail }) => detail.camera.position[0].toFixed());
 const { data } = await viewer.screenshot({ width: 320, height: 180 });
 data.fill(0);
-connectPage(viewer, document.createElement("div"), document.createElement("p")).setStep(1);
 
 // @ts-expect-error three numbers
 viewer.camera = { position: [1, 2], focal_point: [0, 0, 0], view_up: [0, 0, 1] };
