@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import warnings
 
 import numpy as np
@@ -81,16 +80,6 @@ def test_a_rectilinear_grid_of_equidistant_points_is_the_uniform_grid(plotter, d
         plotter.add_vdi(pv.RectilinearGrid(axis, axis, axis))
 
 
-def test_names_of_vtk_s_mappers_mean_nothing_and_are_noted(plotter):
-    with pytest.warns(VDIWarning, match="mapper='gpu' chooses among VTK's.*is ignored"):
-        plotter.add_vdi(soft_ball(8), mapper="gpu", multi_colors=True, name="it", **LOOKS)
-    named = shown(plotter)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        plotter.add_vdi(soft_ball(8), name="it", **LOOKS)
-    np.testing.assert_array_equal(shown(plotter), named)
-
-
 def test_plot_of_a_grid_is_what_a_plotter_shows(plotter):
     volume = soft_ball(8)
     arguments = {
@@ -121,13 +110,6 @@ def test_a_plot_that_is_refused_leaves_no_plotter():
     with pytest.raises(TypeError, match="'opcity': did you mean 'opacity'"):
         soft_ball(8).vdi.plot(off_screen=True, opcity=1)
     assert before == _ALL_PLOTTERS
-
-
-def test_help_is_the_method_s(plotter):
-    for found in (plotter.add_vdi, type(plotter).add_vdi):
-        assert inspect.getdoc(found).startswith("Add a volume that turns fluently")
-        assert "max_supersegments : int" in inspect.getdoc(found)
-    assert next(iter(inspect.signature(plotter.add_vdi).parameters)) == "volume"
 
 
 def added(plotter):
@@ -161,16 +143,3 @@ def test_asking_for_the_data_to_be_exported_warns_once_and_nothing_else_does(plo
     alone.SetVDI(vdi_of_one_list())
     with pytest.warns(VDIWarning, match=MESSAGE):
         serialized(alone)
-
-
-@pytest.mark.parametrize("what", ["export_html", "export_vtksz"])
-@pytest.mark.parametrize("of", ["plotter", "plotter.trame"])
-def test_exports_of_trame_warn(plotter, what, of):
-    """PyVista's own name them deprecated as well, and call them."""
-    pytest.importorskip("trame_pyvista")
-    added(plotter)
-    export = getattr(plotter if of == "plotter" else plotter.trame, what)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", pv.PyVistaDeprecationWarning)
-        with pytest.warns(VDIWarning, match=MESSAGE):
-            export(None)
