@@ -132,7 +132,7 @@ LENGTHY = {
     "generation": "generation_oracle march_blocks records",
     "io": "vdi_files",
     "large": "blocks",
-    "measure": "benchmark_scripts baselines",
+    "measure": "benchmark_scripts",
     "model": "packing",
     "plotting": "add_vdi as_added dial shown volume_files",
     "quality": "view_error",
@@ -155,7 +155,7 @@ LENGTHIEST = {
     "measure": "compare lighting_against_vtk real_volumes tradeoff",
     "packaging": "distributions documentation",
     "plotting": "example_scripts in_browser on_screen scenes",
-    "quality": "background dial",
+    "quality": "background targets",
     "vtk_pipeline": "long_load overlap previews regeneration",
     "web": "notebook server",
 }

@@ -57,7 +57,7 @@ def test_blocks_within_blocks_and_none(plotter):
     assert [isinstance(each, list) for each in actors] == [True, False]
     assert plotter.add_vdi(pv.MultiBlock()) == []
     before = len(plotter.renderer.actors)
-    with pytest.raises(UnsupportedError, match="a surface has no volume"):
+    with pytest.raises(UnsupportedError, match="voxelise a surface"):
         plotter.add_vdi(pv.MultiBlock([soft_ball(8), pv.MultiBlock([pv.Sphere()])]))
     assert len(plotter.renderer.actors) == before, "nothing, or all"
 

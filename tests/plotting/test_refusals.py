@@ -69,8 +69,8 @@ VOLUMES = {
         *(VOLUME.cast_to_unstructured_grid(), errors.UnsupportedError),
         "not a uniform.*resample",
     ),
-    "blocks": (pv.MultiBlock([VOLUME, pv.Sphere()]), errors.UnsupportedError, "no volume"),
-    "surface": (pv.Sphere(), errors.UnsupportedError, "a surface has no volume"),
+    "blocks": (pv.MultiBlock([VOLUME, pv.Sphere()]), errors.UnsupportedError, "voxelise a surface"),
+    "surface": (pv.Sphere(), errors.UnsupportedError, "voxelise a surface"),
     "a path": ("brain.nrrd", errors.InvalidVolumeError, "brain.nrrd does not exist"),
 }
 #: Volumes, arguments, kinds of error and words of the message.

@@ -97,15 +97,6 @@ def test_a_view_at_rest_is_estimated_and_gets_a_vdi_if_it_is_poor():
     assert of(AWAY, regenerate="ask", wish=True).make == turned(40)
 
 
-def test_what_is_made_for_a_view_that_was_left_is_given_up_at_rest():
-    making = Making("a", turned(60), for_view=True)
-    on_the_way = replace(AWAY, making=making, draw="vdi")
-    assert not of(on_the_way, view=turned(55)).give_up
-    assert of(on_the_way, view=turned(5)).give_up
-    assert not of(on_the_way, view=turned(5), hand=True).give_up
-    assert not of(on_the_way, view=turned(5), making=replace(making, for_view=False)).give_up
-
-
 def test_somebody_who_sets_another_view_gets_its_vdi():
     asked = of(screen=turned(90), chosen=True)
     assert (asked.make, asked.show) == (turned(90), "vdi")
@@ -135,14 +126,6 @@ def test_what_cannot_be_made_is_said_and_what_was_shown_stays():
     assert of(content=None, made=None).show == "trouble"
     assert of(content=None, watched=False).show == "trouble"
     assert of(content=None, draw="volume").show == "trouble"
-
-
-def test_draw_volume_makes_nothing():
-    found = of(draw="volume", late=True, making=Making("a", HOME, for_view=True))
-    assert (found.show, found.make, found.give_up) == ("volume", None, True)
-    assert of(draw="volume", joint=True, made=None).update
-    assert of(draw="volume", volume="bricks").show == "vdi"
-    assert of(draw="volume", volume="bricks", watched=False, content="b").in_bricks
 
 
 # Pictures that are kept
@@ -183,15 +166,6 @@ def test_pictures_in_which_volumes_overlap_are_drawn_by_vdis():
     assert of(KEPT, joint=True, made=None).show == "exact"
     never = of(KEPT, joint=True, made=None, regenerate="never")
     assert (never.show, never.update) == ("vdi", True)
-
-
-def test_a_vdi_of_what_has_changed_takes_the_view_of_a_whole_picture():
-    changed = replace(KEPT, content="b", draw="vdi")
-    assert (plan(changed).view, plan(changed).update) == ("follow", True)
-    for stays in ({"regenerate": "never"}, {"one_view": False}, {"first_look": False}):
-        assert of(changed, **stays).view is None
-    wish = of(KEPT, regenerate="ask", wish=True)
-    assert (wish.show, wish.view, wish.update) == ("vdi", "take", True)
 
 
 def test_whatever_is_seen_is_planned_without_fail():
