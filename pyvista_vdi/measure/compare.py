@@ -1,8 +1,7 @@
 """One volume rendered by VTK's mappers, our volume raycaster and a VDI, side by side.
 
-Pictures are compared at the accuracy step (half the smallest spacing unless given), frames are
-timed with steps of one voxel in every volume renderer (``docs/dev/conventions.md``). The candidates
-take turns, after one frame each that is not counted, and the median is reported.
+Pictures are compared at half the smallest spacing unless given, frames are timed with steps of one
+voxel. The candidates take turns, after one frame each that is not counted; medians are reported.
 """
 
 from __future__ import annotations
@@ -169,10 +168,7 @@ def table(report: Mapping[str, Any]) -> str:
 
 
 def contact_sheet(report: Mapping[str, Any], images: Mapping[float, Images]) -> NDArray[np.uint8]:
-    """Return all panels in one picture: a row per angle, a column per renderer.
-
-    uint8 (height, width, 3), top row first; black behind the panels, captions above them.
-    """
+    """Return all panels in one picture: a row per angle, a column per renderer, uint8 (H, W, 3)."""
     from PIL import Image, ImageDraw, ImageFont
 
     columns = [name for name in NAMES if name in next(iter(images.values()))]

@@ -5,21 +5,18 @@ from __future__ import annotations
 import gc
 import threading
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from drawing import generate_vdi, raycast_volume, render_vdi, request
 from fresh_python import run_python
-from runtimes import let_lack
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.device import scheduling as turns
-from pyvista_vdi.errors import Cancelled, DeviceMemoryError
+from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.generation import generate
 from pyvista_vdi.quality import background
 from pyvista_vdi.quality.background import BackgroundThread, vdi_job
-from pyvista_vdi.raycasting import raycast
 from pyvista_vdi.volume.upload import uploads_of
 
 #: Seconds after which a test that waits for the thread gives up: it would wait for ever.
@@ -181,24 +178,6 @@ def test_cancelling_in_the_middle(runtime, generator, before, gate):
     assert taken(generator).equals(make(runtime))
 
 
-def test_what_is_finished_too_late_is_dropped(runtime, generator, monkeypatch):
-    """After its last piece of work nothing stops a generation: it may not pass for the next one."""
-    finished, replaced = threading.Event(), threading.Event()
-
-    def render_and_wait(*arguments, **options):
-        raycast.render_vdi(*arguments, **options)
-        if not finished.is_set():
-            finished.set()
-            replaced.wait(PATIENCE)
-
-    monkeypatch.setattr(background, "render_vdi", render_and_wait)
-    start(generator, key="old")
-    assert finished.wait(PATIENCE)
-    start(generator, CAMERA.azimuth(10), key="new")
-    replaced.set()
-    assert taken(generator).equals(make(runtime, CAMERA.azimuth(10)))
-
-
 def test_closing_in_the_middle(runtime, gate):
     generator = new_generator(runtime)
     start(generator)
@@ -236,22 +215,6 @@ assert generator.running
 """
     done = run_python(code)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-
-
-@pytest.mark.parametrize("where", ["supersegment media", "everything"])
-def test_a_lack_of_memory(runtime, generator, before, monkeypatch, where):
-    """Also while the error waits to be raised nothing is kept, of the VDI or of its way there."""
-    with monkeypatch.context() as patched:
-        if where == "everything":
-            patched.setattr(runtime, "info", replace(runtime.info, max_allocation=1000))
-        else:
-            let_lack(patched, runtime, where)
-        begin(generator, request(VOLUME, CAMERA, WINDOW, TRANSFER, **OPTIONS))
-        finish(generator)
-        assert memory_in_use(runtime) == before
-        with pytest.raises(DeviceMemoryError):
-            generator.take()
-    assert memory_in_use(runtime) == before
 
 
 def test_a_volume_that_both_threads_need_first(runtime, generator, monkeypatch):

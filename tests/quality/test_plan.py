@@ -10,7 +10,7 @@ import pytest
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.costs import Costs
-from pyvista_vdi.quality.plan import Made, Making, Plan, Seen, ViewEstimate, lacking, plan
+from pyvista_vdi.quality.plan import Made, Making, Plan, Seen, ViewEstimate, plan
 
 BOUNDS = (-1.0, 1.0) * 3
 HOME = View(Camera((0, 0, 9), (0, 0, 0), (0, 1, 0)), (320, 180))
@@ -95,11 +95,6 @@ def test_a_view_at_rest_is_estimated_and_gets_a_vdi_if_it_is_poor():
     assert (plan(good).make, plan(good).estimate) == (None, None)
     assert of(good, view=turned(43)).estimate == "background", "it was of another view"
     assert of(AWAY, regenerate="ask", wish=True).make == turned(40)
-
-
-def test_somebody_who_sets_another_view_gets_its_vdi():
-    asked = of(screen=turned(90), chosen=True)
-    assert (asked.make, asked.show) == (turned(90), "vdi")
 
 
 def test_vdi_or_volume_whichever_is_better_in_time():
@@ -191,14 +186,3 @@ def test_whatever_is_seen_is_planned_without_fail():
         assert found.make is None or not (seen.failed or found.update)
         if seen.watched and seen.made is not None:
             assert not found.update
-
-
-def test_what_a_vdi_without_its_volume_lacks_is_said():
-    fine = Made(1, BOUNDS, angle=50.0, coverage=0.95, magnification=1.5)
-    assert lacking(fine, 60.0, "x") == []
-    poor = Made(1, BOUNDS, angle=70.0, coverage=0.5, magnification=2.5)
-    assert [cause for cause, _ in lacking(poor, 60.0, "x")] == [
-        "angle",
-        "coverage",
-        "magnification",
-    ]

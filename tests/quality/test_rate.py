@@ -69,13 +69,6 @@ def test_full_where_that_fits_and_the_floor_where_nothing_does():
     assert (chosen[70:] == FULL).all()
 
 
-def test_where_all_else_alone_misses_the_rate_the_work_gets_a_quarter_of_the_time():
-    each = 0.2 / FULL
-    chosen, true, _ = run(lambda _: each, overhead=0.05)
-    share = chosen[FIRST:] * each / true[FIRST:]
-    np.testing.assert_allclose(share, 0.25, atol=0.02)
-
-
 # A window
 
 

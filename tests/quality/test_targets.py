@@ -12,7 +12,7 @@ from drawing import request
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import TransferFunction, Volume
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError, VDIWarning
+from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
 from pyvista_vdi.generation import generate
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -135,33 +135,12 @@ def test_what_contradicts_or_is_out_of_range_is_refused(default_runtime, asked, 
         generated(default_runtime, **asked)
 
 
-def test_reference_is_what_is_made_without_a_dial(default_runtime):
-    plain = generated(default_runtime)
-    reference = generated(default_runtime, quality="reference")
-    assert reference.equals(plain)
-    assert reference.metadata == plain.metadata
-    assert describe(plain.metadata) is None
-
-
-def test_a_volume_out_of_view_is_made_as_cheaply_as_can_be(default_runtime):
-    aside = VIEW.replace(focal_point=np.add(VIEW.position, (0, -1, 0)))
-    with pytest.warns(pvdi.VDIWarning, match="the camera sees nothing"):
-        vdi = generated(default_runtime, camera=aside, target_ssim=0.98)
-    assert rung_of(vdi) == 2
-    assert vdi.metadata["dial"]["predicted"]["ssim"] == 1
-
-
 @pytest.mark.parametrize("name", PRESETS)
 def test_a_name_is_looked_up(default_runtime, name):
     vdi, (rung, ssim) = generated(default_runtime, quality=name), PRESETS[name]
     assert rung_of(vdi) == rung
     assert vdi.metadata["dial"]["predicted"] == {"ssim": ssim}
     assert f"predicted SSIM {ssim:.3f} at 30" in describe(vdi.metadata)
-
-
-def test_choosing_can_be_cancelled(default_runtime):
-    with pytest.raises(Cancelled):
-        generated(default_runtime, target_ssim=0.9, progress=lambda _: False)
 
 
 def test_metadata_say_what_was_asked_chosen_and_predicted(default_runtime, tmp_path):

@@ -209,6 +209,7 @@ def empty_vdi(camera=FRONT, bounds=BOUNDS, window_size=(20, 20)):
 TURN = np.eye(3)
 TURN[:2, :2] = rotation(30)
 PARALLEL = FRONT.replace(parallel_projection=True, parallel_scale=2)
+SMALL = PARALLEL.replace(parallel_scale=1)
 
 
 @pytest.mark.parametrize(
@@ -286,9 +287,9 @@ def test_magnification(old, new, size, expected):
     ("old", "new", "share"),
     [
         (PARALLEL, PARALLEL, 1.0),
-        (PARALLEL.replace(parallel_scale=1.0), PARALLEL.replace(parallel_scale=4.0), 1.0),
-        (PARALLEL.replace(parallel_scale=1.0, window_center=(1.0, 0.0)), PARALLEL, 0.5),  # its left half lies outside
-        (PARALLEL.replace(parallel_scale=0.5), PARALLEL.replace(parallel_scale=1.0), 0.25),
+        (SMALL, PARALLEL, 1.0),
+        (SMALL.replace(window_center=(1.0, 0.0)), PARALLEL, 0.5),  # its left half lies outside
+        (SMALL.replace(parallel_scale=0.5), SMALL, 0.25),
         (PARALLEL, PARALLEL.replace(focal_point=(0, -20, 0)), 1.0),  # nothing in view
     ],
 )
