@@ -11,7 +11,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
 from pyvista_vdi.measure.bench import as_json
 from pyvista_vdi.measure.compare import NAMES, measure
-from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 
 SIZE = (96, 64)
 LOOKS = {"cmap": "viridis", "opacity": "linear", "interpolation": "linear"}
@@ -82,3 +82,16 @@ def test_the_command_writes_a_table_a_picture_figures_and_the_vdi(
     # 8 bytes a supersegment and their lists' headers, of the arrays' 24 and the packed form
     assert report["sizes"]["device_bytes"] < 0.5 * report["sizes"]["vdi_bytes"]
     assert vdi.camera == filling_camera(vdi.bounds, (80, 48))
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize(("name", "way"), [("brain", "linear"), ("rayleigh_taylor", "nearest")])
+def test_shipped_volumes_are_as_vtk_draws_them(name, way, default_runtime):
+    """With the soft transfer function; measured: SSIM .9949, PSNR 40.0 dB at least."""
+    pytest.importorskip("pyvista")
+    looks = {**TRANSFER_FUNCTIONS["soft"], "interpolation": way}
+    volume = pvdi.examples.load_data(name, as_volume=True)
+    report, _, _ = measure(volume, looks, (320, 180), repeats=0)
+    for view in report["views"]:
+        assert view["near"]["raycaster_to_gpu"]["ssim"] >= 0.99, view["angle"]
+        assert view["near"]["raycaster_to_gpu"]["psnr"] >= 38.0, view["angle"]

@@ -6,15 +6,12 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
 from pyvista_vdi.measure.tradeoff import (
     COSTS,
     Point,
-    Tradeoff,
     dominates,
     measure_tradeoff,
     sweep,
@@ -78,10 +75,3 @@ def test_a_setting_dominates_that_is_better_and_nowhere_worse():
     assert not dominates(slow, fast)
     # Faster, and worse by more than what does not count
     assert not dominates(point(0.8, 0.979), slow)
-
-
-@given(st.lists(st.tuples(st.floats(0.1, 10), st.floats(0.5, 1)), min_size=2, max_size=7))
-def test_no_settings_give_way_to_each_other_in_turn(figures):
-    """Something is always on the front."""
-    points = [point(cost, ssim, tolerance=k) for k, (cost, ssim) in enumerate(figures)]
-    assert Tradeoff({}, points, {}).front("frame")
