@@ -9,7 +9,7 @@ DEVICES = "json"
 GENERATE = """
 VOLUME output size=1280x720
 camera: the view that the volume fills, 20 degrees above its middle
-table: deferral: occlusion:
+table: ambient_occlusion deferral:
 [limits]
 max_supersegments criterion sample_distance tolerance view_cone memory_limit
 [quality] Lists and precision are chosen by a measurement; --size is that of pictures.

@@ -119,7 +119,7 @@ def test_every_door_refuses_it_in_the_same_words(name, value, message, default_r
 
 @pytest.mark.parametrize("blending", ["maximum", "minimum", "average", "additive"])
 def test_a_vdi_composites(blending):
-    with pytest.raises(pvdi.UnsupportedError, match=f"'{blending}' is not .* by .*render_volume"):
+    with pytest.raises(pvdi.UnsupportedError, match=f"'{blending}' is not .* by .*add_volume"):
         pvdi.generate(VOLUME, CAMERA, SIZE, blending=blending)
 
 

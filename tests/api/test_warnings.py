@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from PIL import Image
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.io.volumes import read_volume
 
 pytestmark = pytest.mark.gl
 
@@ -26,10 +24,10 @@ def plotter():
     plotter.close()
 
 
-def slices_that_are_missing(plotter, tmp_path):
-    for number in (1, 2, 5):
-        Image.fromarray(np.full((4, 4), number, np.uint8)).save(tmp_path / f"{number}.png")
-    read_volume(tmp_path)
+def an_effect_that_does_not_see_it(plotter, tmp_path):
+    plotter.add_vdi(VALUES, show_scalar_bar=False)
+    plotter.enable_ssao()
+    plotter.screenshot(return_img=True)
 
 
 def a_camera_that_looks_away(plotter, tmp_path):
@@ -39,7 +37,7 @@ def a_camera_that_looks_away(plotter, tmp_path):
 
 CASES = [
     a_camera_that_looks_away,
-    slices_that_are_missing,
+    an_effect_that_does_not_see_it,
 ]
 
 

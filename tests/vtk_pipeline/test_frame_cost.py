@@ -1,48 +1,18 @@
-"""What a frame costs around the raycast: counted, not timed."""
+"""Depth of what is opaque, which is read again only where that has changed."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import LOOKS, opaque_sphere, shown, soft_ball
+from plugin_scenes import LOOKS, shown, soft_ball
 
-from pyvista_vdi.vtk_pipeline.drawing import images
-from pyvista_vdi.vtk_pipeline.drawing import screen as texture_module
-from pyvista_vdi.vtk_pipeline.vtk import vtkPlane, vtkTextureObject
+from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
 
 WINDOW = (120, 90)
 VIEW = ((4, 3, 2), (0, 0, 0), (0, 0, 1))
-
-
-class Counts(dict):
-    """Calls by name."""
-
-    def add(self, name):
-        self[name] = self.get(name, 0) + 1
-
-    def watch(self, monkeypatch, owner, name):
-        """Count the calls of a function."""
-        function = getattr(owner, name)
-        monkeypatch.setattr(owner, name, lambda *a, **k: self.add(name) or function(*a, **k))
-
-
-@pytest.fixture
-def counts(monkeypatch):
-    """Raycasts, uploads and allocations of images."""
-    found = Counts()
-    found.watch(monkeypatch, images, "render_vdi")
-    found.watch(monkeypatch, images, "aligned_empty")
-
-    class Texture(vtkTextureObject):
-        def Create2DFromRaw(self, *args):
-            found.add("upload")
-            return super().Create2DFromRaw(*args)
-
-    monkeypatch.setattr(texture_module, "vtkTextureObject", Texture)
-    return found
 
 
 @pytest.fixture
@@ -52,25 +22,6 @@ def plotter():
     plotter.camera_position = VIEW
     yield plotter
     plotter.close()
-
-
-@pytest.mark.parametrize("opaque", [False, True])
-def test_a_view_that_has_not_changed_costs_nothing(plotter, counts, opaque):
-    if opaque:
-        opaque_sphere(plotter)
-    plotter.show(auto_close=False)
-    plotter.render_window.Render()
-    plotter.render()
-    assert counts == {"render_vdi": 1, "upload": 1, "aligned_empty": 1}
-
-
-def test_what_moves_allocates_nothing(plotter, counts):
-    plotter.show(auto_close=False)
-    for _ in range(6):
-        plotter.camera.Azimuth(3)
-        plotter.render()
-    assert counts["render_vdi"] == 7
-    assert counts["aligned_empty"] == 2  # what is shown, and what is drawn
 
 
 def changes_of_what_is_opaque(plotter, sphere):

@@ -23,7 +23,6 @@ from watched_windows import (
 )
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import VDIWarning
 
 pytestmark = pytest.mark.gl
 
@@ -65,15 +64,6 @@ def test_auto_with_the_real_estimate(plotter):
     plotter.camera.Azimuth(60)
     frames_until(plotter, lambda: actor.vdi is not old)
     np.testing.assert_array_equal(frame(plotter), picture_of(actor.vdi, plotter))
-
-
-def test_what_cannot_be_made_any_more_is_said_and_the_old_stays(plotter):
-    actor = watched(plotter)
-    before = frame(plotter)
-    actor.prop.SetTransferFunctionModeTo2D()
-    with pytest.warns(VDIWarning, match="cannot be made anew: UnsupportedError: .*2D transfer"):
-        frame(plotter)
-    np.testing.assert_array_equal(frame(plotter), before)
 
 
 def in_the_middle():

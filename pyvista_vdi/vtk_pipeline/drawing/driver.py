@@ -114,6 +114,8 @@ class Driver(Planner):
         What lit the last frame stays.
         """
         held = [] if self.input is None else self.input.on_devices()
+        if self._volume is not None:
+            held.append(self._volume.request.volume)
         if isinstance(self.input, SourceInput):
             self.input.keep_lights(self.renderers())
         self._timer.stop()

@@ -89,7 +89,7 @@ def group_of(own: Frame) -> Group:
         low, high = rectangles[:, 0], rectangles[:, 1]
         before = (low[:, None] <= high + _APART).all(axis=-1)
         groups: list[set[int]] = []
-        for i, touching in enumerate(np.logical_and(before, before.T)):
+        for i, touching in enumerate(np.asarray(before & before.T)):
             touched = [g for g in groups if touching[list(g)].any()]
             groups = [g for g in groups if g not in touched]
             groups.append({i}.union(*touched))
