@@ -269,9 +269,9 @@ class Driver(Planner):
             self.begin_at_rest(window)
         if not self.goes_on:
             self._timer.stop()
-        renderer = self.renderer()
-        if swapped and renderer is not None:
-            renderer.GetRenderWindow().GetInteractor().Render()
+        interactor = self._timer.interactor()
+        if swapped and interactor is not None:
+            interactor.Render()
 
     # Errors in a frame
 
