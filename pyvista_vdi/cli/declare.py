@@ -119,8 +119,6 @@ azimuth=0           DEGREES   turn by
 elevation=0         DEGREES   lift by
 tf                  {tf}      a standard transfer function; --cmap and --opacity change its parts
 transfer_function   FILE      TransferFunction.to_dict() as JSON; needs no PyVista
-occlusion_radius    LENGTH    how far something hides (default: 0.05 of the bounds' diagonal)
-occlusion_strength  S         0 to 1, which is darkest (default: 0.1)
 memory_limit        SIZE      of the device, like 2GiB; what does not fit goes there in bricks
 criterion           NAME      where a list is cut: least-error (default) or homogeneity
 max_bytes           SIZE      most bytes of the VDI on the device, like 20MB
@@ -148,8 +146,6 @@ _GROUPS = {
         transfer_function""",
     "deferral": """[classified afterwards] Scalars are stored; render, view, convert take looks.
         classification value_range""",
-    "occlusion": """[ambient occlusion] Either option below turns it on, too.
-        ambient_occlusion occlusion_radius occlusion_strength""",
 }
 _GROUPS["table"] = f"{_GROUPS['look']} transfer_function"
 

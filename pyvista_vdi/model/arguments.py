@@ -28,7 +28,7 @@ from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 #: What has gone, and what is done in its place.
 _GONE = {
     "skip_empty": "what is empty is passed by, without being asked",
-    "status": "call show_status(plotter) of the actor",
+    "status": "print the status of the actor (actor.status)",
     "resample": "make a uniform grid by PyVista, pyvista.ImageData(...).sample(grid)",
     "mask": "make the opacity of what is left out 0, or set its points' ghosts (vtkGhostType) to 2",
 }

@@ -106,7 +106,7 @@ class ArrayChoice(Described):
             raise UnsupportedError(
                 f"blending={self.blending!r} is not supported: a VDI stores what is composited "
                 "along a ray; pass blending='composite', or draw the volume itself by "
-                "Plotter.add_volume or pyvista_vdi.render_volume"
+                "Plotter.add_volume"
             )
 
 

@@ -117,7 +117,7 @@ _WORDS = {
     "MemoryLike": "int, float or str",
     "OcclusionLike": "bool, float or AmbientOcclusion",
     "OpacityLike": "str or float or array_like",
-    "Policy": '{"auto", "never"} or callable',
+    "Policy": '{"auto", "never"}',
     "RangeLike": "float or (float, float)",
     "ScalarsLike": "str or numpy.ndarray",
     "VolumeLike": "pyvista.DataSet, Volume, path",

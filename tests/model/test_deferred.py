@@ -13,7 +13,6 @@ from pyvista_vdi.cli import main
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
-    UnsupportedError,
 )
 from pyvista_vdi.model.classify_values import spread_of_values
 from pyvista_vdi.model.deferred import lengths_of
@@ -108,22 +107,6 @@ def test_classification_is_the_mean_over_values_of_that_mean_and_spread():
     assert vdi.metadata["transfer_function"] == LOOKS.to_dict()
 
 
-@pytest.mark.parametrize(
-    ("look", "error", "says"),
-    [
-        ({"shade": True}, UnsupportedError, "shading needs gradients"),
-        ({"blending": "maximum"}, UnsupportedError, "blending"),
-        ({"interpolation": "linear"}, InvalidArgumentError, "interpolation was said"),
-        ({"scalars": "a"}, InvalidArgumentError, "scalars was said"),
-        ({"colour": "bone"}, TypeError, "classified"),
-    ],
-)
-def test_what_no_list_knows_is_refused(look, error, says):
-    pytest.importorskip("pyvista")
-    with pytest.raises(error, match=says):
-        deferred().classified(**look)
-
-
 def test_render_takes_the_look(default_runtime):
     made = deferred()
     picture = pvdi.render(made, made.camera, transfer_function=LOOKS)
@@ -173,6 +156,7 @@ def test_convert_and_render_classify_and_say_what_is_missing(tmp_path, capsys):
     for command, says in (
         (["convert", str(seen), "--cmap", "bone", "-o", "x.vdi"], "has its look"),
         (["convert", str(path), "-o", str(tmp_path / "none.exr")], "have no colours yet: give --c"),
+        (["render", str(path), "-o", "x.png"], "kept.vdi stores scalars"),
     ):
         assert main(command) != 0
         assert says in capsys.readouterr().err

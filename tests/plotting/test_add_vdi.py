@@ -429,7 +429,7 @@ def test_nothing_is_left(no_leaks, end):
         actor,
         actor.mapper,
         actor.mapper.GetSource(),
-        actor.mapper.driver.proxy,
+        actor.mapper.driver.box.image,
         actor.prop,
     ):
         alive[type(thing).__name__] = weak = vtkWeakReference()
@@ -442,12 +442,3 @@ def test_nothing_is_left(no_leaks, end):
     gc.collect()
     # beyond Python's view: VTK's own counts
     assert [name for name, weak in alive.items() if weak.Get() is not None] == []
-
-
-def test_actor_that_outlives_its_plotter_holds_no_image():
-    plotter, actor = exercise()
-    driver = actor.mapper.driver
-    assert driver.holds_images
-    plotter.close()
-    assert not driver.holds_images
-    assert actor.vdi is not None

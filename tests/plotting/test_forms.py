@@ -12,21 +12,15 @@ from plugin_scenes import (
     LOOKS,
     shown,
     soft_ball,
-    vdi_of_one_list,
 )
 from pyvista.plotting.plotter import _ALL_PLOTTERS
 
-import pyvista_vdi as pvdi
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
 
 pytestmark = pytest.mark.gl
 
 WINDOW = (60, 50)
 #: That the VDI is missing where a scene is written for another renderer.
-MESSAGE = (
-    "exported without its VDI: trame's export_html, export_vtksz and views .* empty box.*"
-    "plotter.vdi.export_html, screenshots"
-)
 
 
 def two_balls():
@@ -128,49 +122,3 @@ def test_help_is_the_method_s(plotter):
         assert inspect.getdoc(found).startswith("Add a volume that turns fluently")
         assert "max_supersegments : int" in inspect.getdoc(found)
     assert next(iter(inspect.signature(plotter.add_vdi).parameters)) == "volume"
-
-
-def added(plotter):
-    actor = plotter.add_vdi(soft_ball(8), show_scalar_bar=False)
-    plotter.add_mesh(pv.Sphere())
-    plotter.show(auto_close=False)
-    return actor.mapper
-
-
-def serialized(mapper):
-    """What the serialisers of trame-vtk and of vtkmodules.web ask a volume mapper for."""
-    mapper.GetInputAlgorithm().Update()
-    return mapper.GetInputDataObject(0, 0)
-
-
-def test_asking_for_the_data_to_be_exported_warns_once_and_nothing_else_does(plotter):
-    mapper = added(plotter)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        plotter.render()
-        plotter.screenshot(return_img=True)
-        plotter.reset_camera()
-        assert len(plotter.meshes) == 2
-        mapper.dataset  # noqa: B018
-        assert mapper.GetInput() is not None
-    with pytest.warns(VDIWarning, match=MESSAGE):
-        proxy = serialized(mapper)
-    assert proxy.GetDimensions() == (2, 2, 2)
-    serialized(mapper)  # warnings are errors: it is not said again
-    alone = pvdi.VDIMapper()  # VTK's own
-    alone.SetVDI(vdi_of_one_list())
-    with pytest.warns(VDIWarning, match=MESSAGE):
-        serialized(alone)
-
-
-@pytest.mark.parametrize("what", ["export_html", "export_vtksz"])
-@pytest.mark.parametrize("of", ["plotter", "plotter.trame"])
-def test_exports_of_trame_warn(plotter, what, of):
-    """PyVista's own name them deprecated as well, and call them."""
-    pytest.importorskip("trame_pyvista")
-    added(plotter)
-    export = getattr(plotter if of == "plotter" else plotter.trame, what)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", pv.PyVistaDeprecationWarning)
-        with pytest.warns(VDIWarning, match=MESSAGE):
-            export(None)

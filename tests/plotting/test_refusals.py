@@ -190,7 +190,6 @@ def test_damaged_image_of_a_vdi_is_refused(plotter):
         ("SetMaskInput", VOLUME, "cannot be masked"),
         ("SetGlobalIlluminationReach", 0.5, "SetAmbientOcclusion"),
         ("SetVolumetricScatteringBlending", 0.5, "SetAmbientOcclusion"),
-        ("SetComputeNormalFromOpacity", True, "gradient of its scalars"),
     ],
 )
 def test_what_the_mapper_cannot_honour(plotter, name, value, message):

@@ -225,24 +225,19 @@ def test_rays_end_earlier_on_request(plotter):
     shown(plotter)  # makes the VDI; from another view rays cross many lists
     plotter.camera.azimuth += 40
     exact, vdi = shown(plotter), actor.vdi
-    actor.transmittance_cutoff = 0.5
+    actor.mapper.SetTransmittanceCutoff(0.5)
     rough = shown(plotter)
     assert 1 < np.abs(exact - rough).max() <= 0.5 * 255 + 1
     assert actor.vdi is vdi
     other = actor.copy()
-    assert other.transmittance_cutoff == actor.mapper.GetTransmittanceCutoff() == 0.5
-    actor.transmittance_cutoff = 1 / 255
+    assert other.mapper.GetTransmittanceCutoff() == 0.5
+    actor.mapper.SetTransmittanceCutoff(1 / 255)
     assert np.abs(shown(plotter) - exact).max() <= 2  # and rounding to bytes
-    assert actor.transmittance_cutoff == 1 / 255
 
 
 @pytest.mark.parametrize(
     ("name", "default", "wrong", "message", "bare"),
     [
-        (
-            *("transmittance_cutoff", 1e-6, (-1e-9, 1.0, np.nan, "dark")),
-            *("transmittance_cutoff must be a number", "no mapper whose rays"),
-        ),
         (
             *("opacity_multiplier", 1.0, (-1.0, np.nan, "thick")),
             *("opacity_multiplier is a finite factor", "no mapper whose opacity"),

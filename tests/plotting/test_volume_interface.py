@@ -45,24 +45,6 @@ def keeping(what, use):
     return what
 
 
-def select(mapper, array):
-    mapper.SetScalarModeToUsePointFieldData()
-    mapper.SelectScalarArray(array)
-
-
-def select_by_name(mapper):
-    if not hasattr(mapper, "SetArrayName"):
-        pytest.skip("this VTK has no such method")
-    mapper.scalar_map_mode = "point_field"
-    mapper.SetArrayAccessMode(1)
-    mapper.array_name = "w"
-
-
-def select_and_leave(mapper):
-    select(mapper, "w")
-    mapper.scalar_map_mode = "point"
-
-
 def show_copy(plotter, actor, **options):
     copied = actor.copy(**options)
     plotter.remove_actor(actor)
@@ -94,10 +76,6 @@ CHANGES = {
     "dataset: another": lambda p, a: setattr(a.mapper, "dataset", other_image()),
     "SetInputData": lambda p, a: a.mapper.SetInputData(other_image()),
     "SetInputDataObject": lambda p, a: a.mapper.SetInputDataObject(0, other_image()),
-    "SelectScalarArray, name": lambda p, a: select(a.mapper, "w"),
-    "SelectScalarArray alone": lambda p, a: a.mapper.SelectScalarArray("w"),
-    "scalar_map_mode, array_name": lambda p, a: select_by_name(a.mapper),
-    "scalar_map_mode and back": lambda p, a: select_and_leave(a.mapper),
     "scalar_map_mode=default": lambda p, a: setattr(a.mapper, "scalar_map_mode", "default"),
     "lookup_table: cmap": lambda p, a: setattr(a.mapper.lookup_table, "cmap", "hot"),
     "lookup_table: opacity": lambda p, a: a.mapper.lookup_table.apply_opacity([0, 0.9]),
@@ -138,7 +116,6 @@ VALUES = {
     "center": lambda p, a: rows([*a.mapper.center, *a.center, a.length]),
     "scalar_map_mode": lambda p, a: (a.mapper.scalar_map_mode, a.mapper.GetScalarMode()),
     "array_name": lambda p, a: a.mapper.array_name,
-    "chosen": lambda p, a: select(a.mapper, "w") or (a.mapper.array_name, a.mapper.GetScalarMode()),
     "scalar_range": lambda p, a: rows(a.mapper.scalar_range),
     "table's range": lambda p, a: rows(a.mapper.lookup_table.scalar_range),
     "interpolate_before_map": lambda p, a: a.mapper.interpolate_before_map,
@@ -158,17 +135,12 @@ VALUES = {
 #: What a VDI cannot honour, and words of what is said.
 REFUSED = {
     "blend_mode": (lambda a: setattr(a.mapper, "blend_mode", "maximum"), "composite blending"),
-    "cell mode": (lambda a: setattr(a.mapper, "scalar_map_mode", "cell"), "SelectScalarArray"),
-    "cell field": (lambda a: a.mapper.SetScalarModeToUseCellFieldData(), "SelectScalarArray"),
-    "mode": (lambda a: a.mapper.SetScalarMode(7), "from 0 to 4; got 7"),
-    "no such array": (lambda a: select(a.mapper, "z"), "no array 'z'"),
     "volume's connection": (
         lambda a: a.mapper.SetInputConnection(a.mapper.GetSource().GetInputConnection(0, 0)),
         "is not a VDI.*VDISource",
     ),
     "sample distance": (lambda a: a.mapper.SetSampleDistance(-1.0), "sample_distance.*got -1.0"),
     "mask": (lambda a: a.mapper.SetMaskInput(image()), "set masked voxels"),
-    "normals": (lambda a: a.mapper.SetComputeNormalFromOpacity(1), "ComputeNormalFromOpacity"),
     "scattering": (lambda a: a.mapper.SetVolumetricScatteringBlending(0.5), "ambient_occlusion"),
     "another mapper": (
         lambda a: setattr(a, "mapper", pv.plotting.mapper.SmartVolumeMapper()),
@@ -234,8 +206,6 @@ def test_what_a_vdi_cannot_honour_is_refused_by_name(closed, name):
 
 def test_a_vdi_without_its_volume_has_no_other_array_and_no_other_steps(plotter):
     actor = plotter.add_vdi(image().vdi.generate(plotter.camera, (8, 6)))
-    with pytest.raises(UnsupportedError, match="keeps its scalars"):
-        actor.mapper.SetScalarModeToUsePointFieldData()
     with pytest.raises(UnsupportedError, match="keeps the steps"):
         actor.mapper.SetSampleDistance(0.1)
 
@@ -254,8 +224,6 @@ def test_the_user_s_arrays_stay_as_they_are(plotter, draw):
     before = state()
     actor = plotter.add_vdi(data, draw=draw)
     plotter.show(auto_close=False)
-    select(actor.mapper, "w")
-    plotter.render()
     actor.mapper.dataset.active_scalars_name = "w"
     actor.mapper.dataset["u"] = np.zeros(N**3)
     plotter.render()
