@@ -6,6 +6,7 @@ import numpy as np
 
 from pyvista_vdi import AmbientOcclusion, Volume
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
+from pyvista_vdi.model.options import GenerationOptions
 
 
 def grid_of(shape, radius, spacing=(1, 1, 1), direction=None):
