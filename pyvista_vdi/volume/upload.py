@@ -90,17 +90,6 @@ def held_voxels(
     return HeldVoxels(None, ranges, scale, variant)
 
 
-def voxel_bytes(volume: Volume, transfer_function: TransferFunction | None = None) -> int:
-    """Return the bytes of a scalar, or of a colour's component, on the device.
-
-    Scalars are taken to be read as they are where it is not known what for.
-    """
-    native = volume.array.dtype.name in _DEVICE_TYPES
-    if transfer_function is not None:
-        native = _suits_natively(volume, transfer_function)
-    return volume.array.dtype.itemsize if native else np.dtype(np.float32).itemsize
-
-
 def reads_natively(
     runtime: Runtime, volume: Volume, transfer_function: TransferFunction, room: Room | None
 ) -> bool:
@@ -204,19 +193,6 @@ def fits_whole(runtime: Runtime, volume: Volume, scale: Scale | None, room: Room
     """Whether there is room for a volume in one piece."""
     uploaded = (runtime, scale) in uploads_of(volume).made
     return room.holds(runtime, device_bytes(volume, scale), other_bytes(volume), uploaded=uploaded)
-
-
-def volume_bytes(volume: Volume, nbytes: int, room: Room) -> tuple[int, int]:
-    """Return what a volume of ``nbytes`` on the device takes there, and its rays' samples, bytes.
-
-    What its macrocells and tables take is in it where there is a limit.
-    """
-    if room.limit is None:
-        return nbytes, 0
-    others = other_bytes(volume)
-    if nbytes + others + room.working <= room.limit:
-        return nbytes + others, 0
-    return room.limit - room.working - room.sample_bytes, room.sample_bytes
 
 
 def voxel_reader(scale: Scale | None) -> Callable[[NDArray[Any]], NDArray[Any]]:

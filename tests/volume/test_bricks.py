@@ -11,7 +11,6 @@ from runtimes import fresh_runtime, let_lack
 
 from pyvista_vdi import Camera, Light, Shading, TransferFunction, Volume
 from pyvista_vdi.errors import DeviceMemoryError
-from pyvista_vdi.generation.slices import estimate
 from pyvista_vdi.volume.bricks import DeviceBricks
 
 WINDOW = (20, 13)
@@ -134,11 +133,9 @@ def test_same_bytes_as_in_one_piece(runtime, used, view, kind, interpolation, lo
 
 
 @pytest.mark.parametrize("limit", [2.45, 3.0])
-def test_the_limit_is_kept_and_the_estimate_says_so(runtime, used, limit):
+def test_the_limit_is_kept(runtime, used, limit):
     volume, camera = volume_of(np.float32), VIEWS["perspective"]
     function, limit = transfer_for(volume), int(limit * 2**20)
-    stated = estimate(volume, WINDOW, memory_limit=limit)
-    assert stated.volume + stated.working == limit
     for draw in (generate_vdi, raycast_volume):
         own = fresh_runtime(runtime)
         options = {"memory_limit": limit, "sample_distance": 1.0, "device": own}
