@@ -24,11 +24,6 @@ from pyvista_vdi.volume.bricks import (
     least_brick_bytes,
     too_small,
 )
-from pyvista_vdi.volume.kernels import (
-    MACROCELL_DISTANCES,
-    MACROCELL_VISIBILITY,
-    SCALAR_MEDIA,
-)
 from pyvista_vdi.volume.occlusion_grid import ambient_transmittances, opacities_of_part
 from pyvista_vdi.volume.rays import GridPart, GridRays, Variant, checked_sample_distance
 from pyvista_vdi.volume.upload import (
@@ -305,7 +300,9 @@ def _media_of_scalars(runtime: Runtime, table: _Table, first: int, last: int) ->
     n = last - first + 1
     media = runtime.buffer((n, 4), name="media of scalars")
     with table.buffer as classified:
-        launch = runtime.bind(SCALAR_MEDIA, table=classified, media=media)
+        launch = runtime.bind(
+            "volume/scalar_media.cl", "scalar_media", table=classified, media=media
+        )
         numbers = {"entries": table.entries, "low": table.low, "per_scalar": table.per_scalar}
         launch(padded(n, GROUP), GROUP, **numbers, first=first, count=n)
         runtime.finish()  # the table may be host memory in use
@@ -355,7 +352,8 @@ def _visibility(
     np.cumsum(transfer_function.opacities > 0, out=before[1:])
     with runtime.upload(before, "visible entries") as visible_before:
         launch = runtime.bind(
-            MACROCELL_VISIBILITY,
+            "volume/macrocells.cl",
+            "macrocell_visibility",
             voxels.variant.defines,
             ranges=voxels.ranges,
             macrocells=n,
@@ -383,7 +381,9 @@ def _distances(
     far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
     distances = runtime.upload(far, "empty macrocells")
     defines = voxels.variant.defines
-    launch = runtime.bind(MACROCELL_DISTANCES, defines, macrocells=seen.size, most=_FARTHEST)
+    launch = runtime.bind(
+        "volume/macrocells.cl", "macrocell_distances", defines, macrocells=seen.size, most=_FARTHEST
+    )
     apart = 1
     for along in macrocells_over(volume.dimensions):
         with distances as before:

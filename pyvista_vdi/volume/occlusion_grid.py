@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from pyvista_vdi.device import DeviceBuffer, Runtime, padded
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
-from pyvista_vdi.volume.kernels import AMBIENT_TRANSMITTANCES, STEP_OPACITIES
 from pyvista_vdi.volume.rays import Variant
 
 Triple = tuple[int, int, int]
@@ -102,7 +101,13 @@ def _fill(
     """
     sample_distance, unit_distance = lengths
     points, first, nodes, margin, in_all = where
-    launch = runtime.bind(STEP_OPACITIES, variant.defines, **medium, opacities=opacities)
+    launch = runtime.bind(
+        "volume/ambient_occlusion.cl",
+        "step_opacities",
+        variant.defines,
+        **medium,
+        opacities=opacities,
+    )
     launch(
         (*padded(nodes[0], _GROUP), *nodes[1:]),
         (_GROUP, 1, 1),
@@ -134,7 +139,12 @@ def _march(
         runtime.upload(places, "places of steps") as place_buffer,
         runtime.upload(shares, "weights of steps") as share_buffer,
     ):
-        launch = runtime.bind(AMBIENT_TRANSMITTANCES, variant.defines, opacities=opacities)
+        launch = runtime.bind(
+            "volume/ambient_occlusion.cl",
+            "ambient_transmittances",
+            variant.defines,
+            opacities=opacities,
+        )
         launch(
             (*padded(grid.nodes[0], _GROUP), *grid.nodes[1:]),
             (_GROUP, 1, 1),

@@ -30,11 +30,6 @@ from pyvista_vdi.extensions.large.blocks import (
     ends_of,
     with_halo,
 )
-from pyvista_vdi.extensions.large.kernels import (
-    APPEND_RUNS,
-    COPY_RUNS,
-    OPTICAL_DEPTHS,
-)
 from pyvista_vdi.generation.list_arrays import GrowingLists
 from pyvista_vdi.generation.march import March, Records
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
@@ -347,7 +342,8 @@ class Task:
         ):
             launch = RayLaunch(
                 runtime,
-                OPTICAL_DEPTHS,
+                "large/optical_depths.cl",
+                "optical_depths",
                 variant.defines,
                 one_by_one=variant.one_by_one,
                 **medium.medium_arguments(self.camera),
@@ -378,7 +374,9 @@ def _downloaded(records: Records, part: Slice) -> tuple[NDArray[np.uint16], NDAr
         runtime.upload(begins, "places of runs") as places,
         runtime.buffer((max(made, 1), RUN_WORDS), name="runs") as runs,
     ):
-        launch = runtime.bind(COPY_RUNS, records.defines, records=records.runs, runs=runs)
+        launch = runtime.bind(
+            "large/runs.cl", "copy_runs", records.defines, records=records.runs, runs=runs
+        )
         launch(
             records.items,
             GROUP,
@@ -399,7 +397,9 @@ def _append(records: Records, piece: Piece) -> None:
         runtime.upload(begins, "places of runs") as places,
         runtime.upload(np.ascontiguousarray(piece.runs), "runs") as runs,
     ):
-        launch = runtime.bind(APPEND_RUNS, records.defines, records=records.runs, runs=runs)
+        launch = runtime.bind(
+            "large/runs.cl", "append_runs", records.defines, records=records.runs, runs=runs
+        )
         launch(
             records.items,
             GROUP,
