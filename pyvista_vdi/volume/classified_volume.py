@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, padded
 from pyvista_vdi.device.constants import GROUP
@@ -24,7 +23,7 @@ from pyvista_vdi.volume.bricks import (
     least_brick_bytes,
     too_small,
 )
-from pyvista_vdi.volume.occlusion_grid import ambient_transmittances, opacities_of_part
+from pyvista_vdi.volume.occlusion_grid import ambient_transmittances
 from pyvista_vdi.volume.rays import GridPart, GridRays, Variant, checked_sample_distance
 from pyvista_vdi.volume.upload import (
     ENTRY_BYTES,
@@ -60,9 +59,8 @@ class DeviceVolume:
     classification. ``options``, and ``changes`` of them, say how it is sampled; ``skip_empty``
     passes by macrocells that the transfer function makes transparent, with the same samples. With
     ``part``, the volume's points lie in a grid of which they are a part: marches go along the whole
-    grid's rays, and take the steps that belong to the part; ``ambient``, float32 (nz, ny, nx), is
-    then the mean transmittance around the nodes of the whole grid's occlusion. A volume for which
-    ``room`` is too little is held brick by brick; without it in one piece or refused.
+    grid's rays, and take the steps that belong to the part. A volume for which ``room`` is too
+    little is held brick by brick; without it in one piece or refused.
 
     Rays are marched through ``grid``, the volume or what it is a part of. ``bricks`` are on the
     device where the whole volume is not: steps must be sampled by a
@@ -81,7 +79,6 @@ class DeviceVolume:
         *,
         skip_empty: bool = True,
         part: GridPart | None = None,
-        ambient: NDArray[np.float32] | None = None,
         room: Room | None = None,
         **changes: Any,
     ) -> None:
@@ -154,11 +151,7 @@ class DeviceVolume:
                     f"{bytes_text(device_bytes(volume, scale))}: raise memory_limit, leave "
                     "ambient_occlusion out, or use another device"
                 )
-            self._arguments["ambient"] = (
-                self._occluded(asked, occlusion)
-                if ambient is None
-                else runtime.upload(ambient, "ambient occlusion")
-            )
+            self._arguments["ambient"] = self._occluded(asked, occlusion)
         # Last: nothing that fails then keeps them for as long as somebody looks at the error
         self.bricks: DeviceBricks | None = None
         if voxels.buffer is None:
@@ -201,36 +194,15 @@ class DeviceVolume:
         opacity = looks.replace(colors=np.zeros_like(looks.colors), shading=None)
         radius, directions = occlusion.radius_in(self.volume), occlusion.directions
         key = (opacity, radius, directions, self.sample_distance)
-        return uploads_of(self.volume).kept(
-            self.runtime,
-            "occlusion",
-            key,
-            lambda: ambient_transmittances(self.runtime, grid, **self._opacity_arguments()),
-        )
-
-    def part_opacities(
-        self,
-        grid: OcclusionGrid,
-        first: tuple[int, int, int],
-        nodes: tuple[int, int, int],
-    ) -> NDArray[np.float32]:
-        """Return what this part of a volume has of the opacities of its occlusion's nodes.
-
-        ``first``: the first of ``nodes``, both along x, y and z; float32 (nz, ny, nx).
-        """
-        points = self.grid.dimensions
-        return opacities_of_part(
-            self.runtime, grid, points, first, nodes, **self._opacity_arguments()
-        )
-
-    def _opacity_arguments(self) -> dict[str, Any]:
-        """Return what the opacities of an occlusion's nodes are made of: lights have no part."""
         names = ("classified", "voxels", "table", "blanked", "gradient")
-        return {
-            "medium": {**{k: self._arguments[k] for k in names}, "visible": self._visible},
-            "variant": replace(self.variant, shaded=0, compensated=0, sharp=False),
-            "lengths": (self.sample_distance, self.unit_distance),
-        }
+        medium = {**{name: self._arguments[name] for name in names}, "visible": self._visible}
+        variant = replace(self.variant, shaded=0, compensated=0, sharp=False)
+        lengths = self.sample_distance, self.unit_distance
+
+        def make() -> DeviceBuffer:
+            return ambient_transmittances(self.runtime, grid, medium, variant, lengths)
+
+        return uploads_of(self.volume).kept(self.runtime, "occlusion", key, make)
 
 
 @dataclass(frozen=True)
