@@ -179,7 +179,6 @@ def test_what_an_earlier_run_wrote_is_kept_or_continued(tmp_path, scene):
         ({"scene": (volume, camera.azimuth(1), size)}, "its camera is"),
         ({"scene": (volume, camera, (9, 8))}, "its window_size is"),
         ({"clim": (0, 100)}, "classification"),
-        ({"overwrite": True}, "pass one of them"),
     ):
         with pytest.raises(InvalidArgumentError, match=message):
             simulate(path, **{"scene": scene, "times": [9.0], "append": True, **wrong})
