@@ -69,8 +69,13 @@ def looks(transfer_function, interpolation):
     return {**TRANSFER_FUNCTIONS[transfer_function], "interpolation": interpolation}
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize(("name", "transfer_function", "interpolation"), list(MEASURED))
+@pytest.mark.parametrize(
+    ("name", "transfer_function", "interpolation"),
+    [
+        pytest.param(*case, marks=[pytest.mark.slow] * (k % 3 > 0))
+        for k, case in enumerate(MEASURED)
+    ],
+)
 def test_shipped_volumes_small(name, transfer_function, interpolation, default_runtime):
     pytest.importorskip("pyvista")
     volume = examples.load_data(name, as_volume=True)

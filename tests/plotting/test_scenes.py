@@ -168,8 +168,10 @@ SCENES = {
 }
 
 
-@pytest.mark.every(2)
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (k % 2)) for k, name in enumerate(SCENES)],
+)
 def test_it_is_drawn_as_a_volume_is(name):
     scene, options = SCENES[name]
     assert_as_vtk(scene, **options)
@@ -186,8 +188,7 @@ def test_camera_inside():
         assert_as_vtk(scene)
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("lighting", ["light kit", "three lights", "none"])
+@pytest.mark.parametrize("lighting", ["light kit", "none"])
 def test_shaded_by_the_plotter_s_lights(lighting):
     def scene(plotter, add):
         add(plotter, soft_ball(), shade=True, ambient=0.2, specular=0.5, specular_power=15)
@@ -196,7 +197,6 @@ def test_shaded_by_the_plotter_s_lights(lighting):
     assert_as_vtk(scene, lighting=lighting)
 
 
-@pytest.mark.every(3)
 @pytest.mark.parametrize("shade", [False, True])
 def test_rgba_scalars(shade):
     ball = soft_ball()
@@ -283,8 +283,7 @@ def test_turned_view_stays_close():
     assert WINDOW[0] == ours.shape[1]
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("lighting", ["light kit", "three lights", "none"])
+@pytest.mark.parametrize("lighting", ["light kit", "none"])
 def test_lights_that_move_with_the_camera_make_no_vdi(lighting):
     """VTK writes the eye of each frame into its headlights: they are the same lights."""
     plotter = pv.Plotter(window_size=WINDOW, lighting=lighting)
