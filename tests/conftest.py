@@ -7,8 +7,6 @@ PYVISTA_VDI_TEST_DEVICES
     contain one; "all": on every usable one. By default on the one that users get.
 PYVISTA_VDI_TEST_AS_GPU
     "1": devices pass for GPUs, and clang checks each program for one (tests/support/as_gpu.py).
-PYVISTA_VDI_TEST_WHOLE
-    "1": the slow tests measure all cases of the standard table, an hour, in place of a sample.
 PYVISTA_VDI_REQUIRE_DEVICE
     "1": having no usable device is a failure, as in CI; otherwise such tests are skipped.
 PYVISTA_VDI_REQUIRE_INSTALLED
