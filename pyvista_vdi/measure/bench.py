@@ -85,7 +85,7 @@ def accuracy(image: Image, reference: Image) -> dict[str, float]:
 
 
 def check_plan(angles: Sequence[float], least: int = 1, **counts: int) -> None:
-    """Refuse angles that are none or given twice, and numbers of repetitions that make no sense."""
+    """Refuse angles that are none, and numbers of repetitions that make no sense."""
     for name, count in counts.items():
         if not (isinstance(count, int) and least <= as_whole(count) <= 1000):
             raise InvalidArgumentError(
@@ -93,8 +93,6 @@ def check_plan(angles: Sequence[float], least: int = 1, **counts: int) -> None:
             )
     if not angles or not all(math.isfinite(a) for a in angles):
         raise InvalidArgumentError(f"angles must be one or more numbers of degrees; got {angles!r}")
-    if len(set(angles)) < len(angles):
-        raise InvalidArgumentError(f"an angle is given twice: {angles!r}; give each once")
 
 
 def as_json(value: Any) -> Any:

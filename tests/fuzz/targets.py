@@ -162,8 +162,7 @@ def base_deferred(index: int = 0) -> DeferredVDI:
     """The same lists with values in place of colours."""
     lists = base_vdi(index)
     mean, spread, share = lists.color.T
-    importance = [(-1000, 0), (3000, 1)] if index % 2 else None
-    about = {"value_range": (-1000, 3000), "unit_distance": 1.5, "importance": importance}
+    about = {"value_range": (-1000, 3000), "unit_distance": 1.5}
     return kept_values(lists, mean, spread / 2, share, **about)
 
 

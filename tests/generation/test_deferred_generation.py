@@ -29,13 +29,13 @@ def columns(array):
     return volume, camera
 
 
-def kept(runtime, array, value_range=None, importance=None, interpolation="nearest", **options):
+def kept(runtime, array, value_range=None, interpolation="nearest", **options):
     volume, camera = columns(array)
     looks = pvdi.TransferFunction([[0] * 3], [0], (0, 1), interpolation=interpolation)
     request = GenerationRequest(
         volume, looks, camera, (NX, NY), GenerationOptions(**options), runtime
     )
-    return generate_deferred(request, Deferral("deferred", value_range, importance))
+    return generate_deferred(request, Deferral("deferred", value_range))
 
 
 def inner(deferred):
@@ -126,7 +126,6 @@ def test_generate_returns_one_and_bakes_by_default(runtime):
         ({"quality": "fast"}, UnsupportedError, "give max_supersegments"),
         ({"blending": "maximum"}, UnsupportedError, "blending"),
         ({"value_range": "all"}, InvalidArgumentError, "value_range must be"),
-        ({"importance": [(2, 1), (1, 1)]}, InvalidArgumentError, "values that grow"),
         ({"classification": "later"}, InvalidArgumentError, "'baked' or 'deferred'"),
         (
             {"classification": "baked", "value_range": (0, 1)},

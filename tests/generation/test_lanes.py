@@ -37,8 +37,6 @@ SHADED = {"shading": Shading(0.2, 0.7, 0.4, 8.0)}
         ("render_volume", "uint8", "linear", "all of it", PLAIN, False, CROPPED | DEPTH),
         ("render_volume", "float32", "nearest", "parallel", SHADED | GRADIENT, True, PLANES | LAMP),
         ("render_volume", "uint8", "linear", "parallel", PLAIN, False, FINE),
-        ("maximum", "uint8", "linear", "all of it", PLAIN, False, PLANES),
-        ("average", "float32", "nearest", "from inside", PLAIN, True, CROPPED | DEPTH),
     ],
 )  # fmt: skip
 def test_blocks_of_rays_give_the_same_bits(
@@ -55,13 +53,9 @@ def test_blocks_of_rays_give_the_same_bits(
         if kernel in ("march_lists", "shorten_lists"):
             return generate_vdi(*arguments, function, device=runtime, **options)
         shown = with_settings(transfer_function=function, **options)
-        if kernel != "render_volume":
-            shown["blending"] = kernel
         return render_volume(*arguments, device=runtime, **shown)
 
-    found, expected, launches = both_ways(
-        monkeypatch, runtime, kernel if "_" in kernel else "project", make
-    )
+    found, expected, launches = both_ways(monkeypatch, runtime, kernel, make)
     assert launches[0] == launches[1] > 0
     if kernel in ("march_lists", "shorten_lists"):
         assert found.equals(expected)
