@@ -104,7 +104,6 @@ class Settings:
     tolerance: float
     view_cone: float
     target_angle: float
-    importance: ArrayLike | None
     transmittance_cutoff: float
     adjust_multi_samples: bool
     regenerate_below: float | None
@@ -112,7 +111,6 @@ class Settings:
     def __init__(
         self, *, sample_distance: float | None = None, memory_limit: MemoryLike | None = None,
         criterion: Criterion = 'least-error', tolerance: float = 0.0, view_cone: float = 60.0,
-        target_angle: float = 30.0, importance: ArrayLike | None = None, transmittance_cutoff: float
-        = 1e-06, adjust_multi_samples: bool = True, regenerate_below: float | None = None, coverage:
-        Coverage = 'bounds',
+        target_angle: float = 30.0, transmittance_cutoff: float = 1e-06, adjust_multi_samples: bool
+        = True, regenerate_below: float | None = None, coverage: Coverage = 'bounds',
     ) -> None: ...

@@ -6,6 +6,7 @@ Everything runs without VTK and PyVista; where VTK is installed its mappers are 
 from __future__ import annotations
 
 import math
+import os
 import statistics
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -16,7 +17,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError, VDIError
+from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIError
+from pyvista_vdi.io import whole_file
 from pyvista_vdi.measure import bench as measuring
 from pyvista_vdi.measure.bench import Bench, Step, ratio, take_turns
 from pyvista_vdi.model.camera import Camera, check_window_size
@@ -151,6 +153,28 @@ class Tradeoff:
         ]
         system = ", ".join(f"{name} {value}" for name, value in plan["system"].items())
         return "\n".join([*lines, "", system, ""])
+
+    def save_plot(self, path: str | os.PathLike[str]) -> Path:
+        """Write SSIM over each cost as a PNG by Matplotlib; it appears whole or not at all."""
+        if find_spec("matplotlib") is None:
+            raise MissingDependencyError(
+                "plots are drawn by Matplotlib, which is not installed: install it by pip install "
+                '"pyvista-vdi[plot]"'
+            )
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(14.0, 10.0), layout="constrained")
+        figure.suptitle(f"{self.plan['name']}: what settings cost and give (better: up and left)")
+        for panel, kind in zip(figure.subplots(2, 2).flat, COSTS, strict=True):
+            panel.scatter(*zip(*((one.costs[kind], one.ssim) for one in self.points), strict=True))
+            for name in self.front(kind):
+                one = next(each for each in self.points if each.name == name)
+                panel.scatter(one.costs[kind], one.ssim, label=name)
+            panel.legend(loc="lower right", fontsize=8)
+            panel.set(xlabel=COSTS[kind][0], ylabel="SSIM, mean of the angles")
+        with whole_file(path) as stream:
+            figure.savefig(stream, dpi=110, format="png")
+        return Path(path)
 
 
 def measure_tradeoff(

@@ -96,35 +96,6 @@ class PlotterVDIActor(VDIActorMethods, Volume):
             return f"PlotterVDIActor(a volume, of which actor.vdi makes a VDI{hidden})"
         return f"PlotterVDIActor({vdi!r}{hidden})"
 
-    def SetProperty(self, prop: Any) -> None:  # noqa: N802
-        """Set the volume property, from which the VDI is regenerated.
-
-        What is shared with a copy of this actor is not changed for the other.
-
-        Parameters
-        ----------
-        prop : vtkVolumeProperty
-            Changes to it are followed.
-
-        Raises
-        ------
-        UnsupportedError, InvalidArgumentError
-            If a VDI cannot honour it; the property before stays.
-        """
-        mapper = self.GetMapper()
-        source = None if mapper is None else mapper.GetSource()
-        if source is not None and prop is not source.GetVolumeProperty():
-            shown = mapper.driver.input
-            mine = shown if shown.alone else shown.separate()
-            mine.source.SetVolumeProperty(prop)
-            if mine is not shown:
-                mapper.driver.set_input(mine)
-        elif mapper is not None and (shown := mapper.driver.input) is not None:
-            mine = shown.classified_by(prop)
-            if mine is not shown:
-                mapper.SetInputData(mine)
-        super().SetProperty(prop)
-
     def camera_to_come(self, renderer: Any) -> Any:
         """Return the camera of a renderer's next picture."""
         return first_camera(renderer, renderer.ComputeVisiblePropBounds())

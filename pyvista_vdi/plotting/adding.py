@@ -323,10 +323,10 @@ def _of_late_values(volume: Any, asked: Addition) -> _Shown:
             "classification"
         )
     source = _source(volume, asked)
-    source.SetDeferral("deferred", asked.deferral.value_range, asked.deferral.importance)
+    source.SetDeferral("deferred", asked.deferral.value_range)
     source.SetVolumeProperty(pv.VolumeProperty(interpolation_type=asked.look.interpolation))
     volume = source.GetVolume()
-    ends, _ = kept_range(volume, asked.options, asked.deferral)
+    ends = kept_range(volume, asked.options, asked.deferral)
     plain = replace(asked, look=replace(asked.look, interpolation="nearest"))
     return _values_shown(source, plain, ends, volume.default_unit_distance, volume.name)
 

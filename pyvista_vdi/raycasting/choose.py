@@ -55,8 +55,8 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     prepared, options = scene.prepared, scene.options
     lists = prepared.switches  # OFFSET_T, DEPTH, PACKED; DOUBLE_FLOAT_RAYS where it is needed
     compensated = summation(options.preview_samples or prepared.most_media)
-    sums = {"COMPENSATED": compensated}
-    walk = {
+    sums: dict[str, int | str] = {"COMPENSATED": compensated}
+    walk: dict[str, int | str] = {
         "CROPPED": int(bool(scene.cropped.forms)),
         "SKIP_EMPTY": int(options.skip_empty and prepared.occupancy.worthwhile),
     }

@@ -63,12 +63,11 @@ class DeviceVolume:
     The volume is uploaded once per device and kept as long as the object lives; the transfer
     function's table, a few kilobytes, each time; ambient occlusion is computed once for a
     classification. ``options``, and ``changes`` of them, say how it is sampled; ``skip_empty``
-    passes by macrocells that the transfer function makes transparent, with the same samples;
-    ``by_scalar`` looks up the medium of each scalar where that can be done. With ``part``, the
-    volume's points lie in a grid of which they are a part: marches go along the whole grid's rays,
-    and take the steps that belong to the part; ``ambient``, float32 (nz, ny, nx), is then the mean
-    transmittance around the nodes of the whole grid's occlusion. A volume for which ``room`` is too
-    little is held brick by brick; without it in one piece or refused.
+    passes by macrocells that the transfer function makes transparent, with the same samples. With
+    ``part``, the volume's points lie in a grid of which they are a part: marches go along the whole
+    grid's rays, and take the steps that belong to the part; ``ambient``, float32 (nz, ny, nx), is
+    then the mean transmittance around the nodes of the whole grid's occlusion. A volume for which
+    ``room`` is too little is held brick by brick; without it in one piece or refused.
 
     Rays are marched through ``grid``, the volume or what it is a part of. ``bricks`` are on the
     device where the whole volume is not: steps must be sampled by a
@@ -86,7 +85,6 @@ class DeviceVolume:
         options: MediumOptions | None = None,
         *,
         skip_empty: bool = True,
-        by_scalar: bool = True,
         part: GridPart | None = None,
         ambient: NDArray[np.float32] | None = None,
         room: Room | None = None,
@@ -114,7 +112,7 @@ class DeviceVolume:
         voxels = held_voxels(runtime, volume, transfer_function, room)
         scale = voxels.scale
         self.zero, self.unit = (0.0, 1.0) if scale is None else (scale.low, scale.unit)
-        classes = _Classes.of(runtime, volume, voxels, transfer_function, by_scalar)
+        classes = _Classes.of(runtime, volume, voxels, transfer_function)
         table, self._visible = classes.table, classes.visible
         distances = classes.distances if skip_empty else None
         nearest = transfer_function.interpolation == "nearest"
@@ -269,7 +267,6 @@ class _Classes:
         volume: Volume,
         voxels: HeldVoxels,
         transfer_function: TransferFunction,
-        by_scalar: bool,
     ) -> "_Classes":
         """Return them, made once for a volume's last classification on a device."""
 
@@ -278,7 +275,7 @@ class _Classes:
             visible = _visibility(runtime, volume, voxels, table, transfer_function)
             distances = _distances(runtime, volume, voxels, visible)
             ends = None
-            if by_scalar and voxels.scale is None and transfer_function.interpolation == "nearest":
+            if voxels.scale is None and transfer_function.interpolation == "nearest":
                 ends = integer_ends(runtime, volume, voxels.ranges)
             if ends is not None:
                 table = _media_of_scalars(runtime, table, *ends)
@@ -286,7 +283,7 @@ class _Classes:
 
         if voxels.buffer is None:  # the memory is for bricks
             return make()
-        key = (transfer_function, voxels.scale, by_scalar)
+        key = (transfer_function, voxels.scale)
         return uploads_of(volume).kept(runtime, "classification", key, make)
 
 

@@ -5,7 +5,6 @@ from pyvista_vdi.device import KernelDeclaration
 _BRICKS, _MACROCELLS = "volume/bricks.cl", "volume/macrocells.cl"
 _OCCLUSION = "volume/ambient_occlusion.cl"
 RENDER_VOLUME = KernelDeclaration("volume/render_volume.cl", "render_volume")
-PROJECT = KernelDeclaration("volume/project.cl", "project")
 WANT_BRICKS = KernelDeclaration(_BRICKS, "want_bricks")
 SAMPLE_STEPS = KernelDeclaration(_BRICKS, "sample_steps")
 MACROCELL_RANGES = KernelDeclaration(_MACROCELLS, "macrocell_ranges")

@@ -223,19 +223,6 @@ def test_gradients_from_denormal_to_huge(runtime, worst, scale, name):
     check(runtime, worst, volume, transfer(0, scale, **function), (0, 8), lit=True)
 
 
-@pytest.mark.parametrize(
-    ("unit", "opacity"),
-    [(1e-8, 1.0), (1.0, 1 - 2.0**-24), (1.0, 1e-7), (1e8, 0.5)],
-)
-def test_unit_distance_and_opacity(runtime, worst, unit, opacity):
-    """Unit distances per extent, and extinctions with them; opacities from hardly any to all."""
-    volume = field_volume()
-    function = transfer(unit_distance=unit * volume.length, opacity=opacity)
-    # Even what is nearly nothing is there to a few digits: below 2^-25 alpha alone would be 0
-    drawn = 0 if opacity / unit < 1e-6 or unit > 1 else 3
-    check(runtime, worst, volume, function, (0, 25, 180), least_drawn=drawn)
-
-
 #: Tables of 33 opacities over 0..1.
 TABLES = {
     "one entry": np.where(np.arange(33) == 17, 0.9, 0),

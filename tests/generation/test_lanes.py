@@ -41,10 +41,6 @@ SHADED = {"shading": Shading(0.2, 0.7, 0.4, 8.0)}
         ("render_volume", "float32", "linear", "along an axis", SHADED, True, DEPTH | LAMP),
         ("render_volume", "uint16", "linear", "parallel", GRADIENT, False, FINE),
         ("render_volume", "int32", "nearest", "past it", PLAIN, True, {"early_termination": False}),
-        ("maximum", "uint8", "linear", "all of it", PLAIN, False, PLANES),
-        ("minimum", "float32", "nearest", "parallel", PLAIN, True, {}),
-        ("average", "float32", "linear", "from inside", PLAIN, False, CROPPED),
-        ("additive", "int16", "linear", "all of it", PLAIN, True, DEPTH),
     ],
 )  # fmt: skip
 def test_blocks_of_rays_give_the_same_bits(
@@ -61,13 +57,9 @@ def test_blocks_of_rays_give_the_same_bits(
         if kernel in ("march_lists", "shorten_lists"):
             return generate_vdi(*arguments, function, device=runtime, **options)
         shown = with_settings(transfer_function=function, **options)
-        if kernel != "render_volume":
-            shown["blending"] = kernel
         return render_volume(*arguments, device=runtime, **shown)
 
-    found, expected, launches = both_ways(
-        monkeypatch, runtime, kernel if "_" in kernel else "project", make
-    )
+    found, expected, launches = both_ways(monkeypatch, runtime, kernel, make)
     assert launches[0] == launches[1] > 0
     if kernel in ("march_lists", "shorten_lists"):
         assert found.equals(expected)

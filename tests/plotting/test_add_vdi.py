@@ -191,7 +191,7 @@ def test_nothing_is_left(no_leaks, end):
         actor,
         actor.mapper,
         actor.mapper.GetSource(),
-        actor.mapper.driver.proxy,
+        actor.mapper.driver.box.image,
         actor.prop,
     ):
         alive[type(thing).__name__] = weak = vtkWeakReference()

@@ -27,7 +27,6 @@ def shown(plotter, **arguments):
 
 def test_the_status_says_what_was_chosen_and_is_predicted(plotter):
     actor = shown(plotter, quality="balanced")
-    actor.show_status(plotter)
     status = actor.status
     assert status.dial == actor.vdi.metadata["dial"]
     assert status.dial["asked"] == {"quality": "balanced"}

@@ -20,7 +20,7 @@ CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or Path(__file__).resolve
 GALLERY = CHECKOUT / "docs" / "gallery"
 
 #: Scripts of the gallery that are run with every change; the others take as long, or longer.
-QUICK = ("ct_pins", "ct_projections")
+QUICK = ("ct_pins",)
 
 pytestmark = pytest.mark.gl
 documented = pytest.mark.skipif(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import pytest
 import pyvista as pv
@@ -11,21 +9,15 @@ from plugin_scenes import (
     LOOKS,
     shown,
     soft_ball,
-    vdi_of_one_list,
 )
 from pyvista.plotting.plotter import _ALL_PLOTTERS
 
-import pyvista_vdi as pvdi
-from pyvista_vdi.errors import UnsupportedError, VDIWarning
+from pyvista_vdi.errors import UnsupportedError
 
 pytestmark = pytest.mark.gl
 
 WINDOW = (60, 50)
 #: That the VDI is missing where a scene is written for another renderer.
-MESSAGE = (
-    "exported without its VDI: trame's export_html, export_vtksz and views .* empty box.*"
-    "plotter.vdi.export_html, screenshots"
-)
 
 
 def two_balls():
@@ -112,34 +104,3 @@ def test_a_plot_that_is_refused_leaves_no_plotter():
     assert before == _ALL_PLOTTERS
 
 
-def added(plotter):
-    actor = plotter.add_vdi(soft_ball(8), show_scalar_bar=False)
-    plotter.add_mesh(pv.Sphere())
-    plotter.show(auto_close=False)
-    return actor.mapper
-
-
-def serialized(mapper):
-    """What the serialisers of trame-vtk and of vtkmodules.web ask a volume mapper for."""
-    mapper.GetInputAlgorithm().Update()
-    return mapper.GetInputDataObject(0, 0)
-
-
-def test_asking_for_the_data_to_be_exported_warns_once_and_nothing_else_does(plotter):
-    mapper = added(plotter)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        plotter.render()
-        plotter.screenshot(return_img=True)
-        plotter.reset_camera()
-        assert len(plotter.meshes) == 2
-        mapper.dataset  # noqa: B018
-        assert mapper.GetInput() is not None
-    with pytest.warns(VDIWarning, match=MESSAGE):
-        proxy = serialized(mapper)
-    assert proxy.GetDimensions() == (2, 2, 2)
-    serialized(mapper)  # warnings are errors: it is not said again
-    alone = pvdi.VDIMapper()  # VTK's own
-    alone.SetVDI(vdi_of_one_list())
-    with pytest.warns(VDIWarning, match=MESSAGE):
-        serialized(alone)

@@ -23,7 +23,6 @@ from plugin_scenes import (
 )
 from pyvista import Plotter
 
-from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkAssembly,
     vtkPropAssembly,
@@ -93,8 +92,7 @@ def seen_under(
 @pytest.mark.parametrize("shade", [True, False])
 def test_screen_space_ambient_occlusion_keeps_the_vdi(expected_messages, shade):
     """It is as dark as what is behind it; VTK's own volume is missing here."""
-    with pytest.warns(VDIWarning, match=r"ambient occlusion \(enable_ssao\) does not see"):
-        ours = seen_under(Plotter.enable_ssao, add_ours, shade=shade)
+    ours = seen_under(Plotter.enable_ssao, add_ours, shade=shade)
     plain = seen_under(None, add_ours, shade=shade)
     dark = seen_under(Plotter.enable_ssao, add_nothing) / seen_under(None, add_nothing)
     assert np.abs(plain - seen_under(None, add_nothing)).max() > 40
@@ -104,48 +102,9 @@ def test_screen_space_ambient_occlusion_keeps_the_vdi(expected_messages, shade):
     assert said.count("ERROR") == said.count("Shading must be")
 
 
-def test_shadows_are_drawn_as_over_a_volume_and_a_warning_says_so():
+def test_shadows_are_drawn_as_over_a_volume():
     judge = seen_under(Plotter.enable_shadows, add_judge)
-    with pytest.warns(VDIWarning, match=r"shadows \(enable_shadows\) are drawn .* after the VDI"):
-        ours = seen_under(Plotter.enable_shadows, add_ours)
+    ours = seen_under(Plotter.enable_shadows, add_ours)
     assert np.abs(ours - judge).max() <= TOLERANCE
 
 
-def test_depth_of_field_says_that_it_does_not_see_a_vdi():
-    with pytest.warns(VDIWarning, match=r"depth of field \(enable_depth_of_field\) does not see"):
-        ours = seen_under(Plotter.enable_depth_of_field, add_ours)
-    assert np.abs(ours - seen_under(Plotter.enable_depth_of_field, add_nothing)).max() > 40
-
-
-@pytest.mark.parametrize("rgba", [False, True])
-def test_a_style_that_moves_actors_moves_what_is_seen(rgba):
-    ball = soft_ball(16)
-    if rgba:
-        ball["v"] = np.repeat(ball["v"][:, np.newaxis], 4, axis=1).astype(np.uint8)
-    plotter = pv.Plotter(window_size=WINDOW)
-    actor = add_ours(plotter, ball)
-    mesh = plotter.add_mesh(pv.Sphere(radius=0.15, center=(-0.9, 0.9, 0.9)), color="w")
-    plotter.camera_position = VIEW
-    plotter.enable_trackball_actor_style()
-    plotter.show(auto_close=False)
-    plotter.renderer.SetWorldPoint(-0.9, 0.9, 0.9, 1)  # in the box, beside the ball
-    plotter.renderer.WorldToDisplay()
-    corner = [round(x) for x in plotter.renderer.GetDisplayPoint()[:2]]
-
-    def drag(x, y):
-        """Press, move and release; return which of the two it has moved."""
-        before = [str(a.GetMatrix()) for a in (actor, mesh)]
-        hand = plotter.iren.interactor
-        for dx, event in enumerate(("LeftButtonPress", "MouseMove", "MouseMove")):
-            hand.SetEventInformation(x + 4 * dx, y + 2 * dx, 0, 0, chr(0), 0, None)
-            hand.InvokeEvent(f"{event}Event")
-        hand.InvokeEvent("LeftButtonReleaseEvent")
-        return [str(a.GetMatrix()) != b for a, b in zip((actor, mesh), before, strict=True)]
-
-    assert drag(*(round(n / 2) for n in WINDOW)) == [True, False]
-    plotter.camera_position = VIEW
-    actor.user_matrix = np.eye(4)
-    plotter.render()
-    assert drag(*corner) == [False, True]
-    assert drag(2, 2) == [False, False]
-    plotter.close()

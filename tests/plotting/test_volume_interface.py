@@ -44,24 +44,6 @@ def keeping(what, use):
     return what
 
 
-def select(mapper, array):
-    mapper.SetScalarModeToUsePointFieldData()
-    mapper.SelectScalarArray(array)
-
-
-def select_by_name(mapper):
-    if not hasattr(mapper, "SetArrayName"):
-        pytest.skip("this VTK has no such method")
-    mapper.scalar_map_mode = "point_field"
-    mapper.SetArrayAccessMode(1)
-    mapper.array_name = "w"
-
-
-def select_and_leave(mapper):
-    select(mapper, "w")
-    mapper.scalar_map_mode = "point"
-
-
 def show_copy(plotter, actor, **options):
     copied = actor.copy(**options)
     plotter.remove_actor(actor)
@@ -86,10 +68,10 @@ CHANGES = {
     "dataset: another array": lambda p, a: a.mapper.dataset.__setitem__("u", np.zeros(N**3)),
     "dataset: another": lambda p, a: setattr(a.mapper, "dataset", other_image()),
     "SetInputData": lambda p, a: a.mapper.SetInputData(other_image()),
-    "SelectScalarArray, name": lambda p, a: select(a.mapper, "w"),
-    "SelectScalarArray alone": lambda p, a: a.mapper.SelectScalarArray("w"),
-    "scalar_map_mode, array_name": lambda p, a: select_by_name(a.mapper),
-    "scalar_map_mode and back": lambda p, a: select_and_leave(a.mapper),
+    "SetInputDataObject": lambda p, a: a.mapper.SetInputDataObject(0, other_image()),
+    "scalar_map_mode=default": lambda p, a: setattr(a.mapper, "scalar_map_mode", "default"),
+    "lookup_table: cmap": lambda p, a: setattr(a.mapper.lookup_table, "cmap", "hot"),
+    "lookup_table: opacity": lambda p, a: a.mapper.lookup_table.apply_opacity([0, 0.9]),
     "lookup_table: another": lambda p, a: own_table(a),
     "scalar_range": lambda p, a: setattr(a.mapper, "scalar_range", (50, 200)),
     "update_scalar_bar_range": lambda p, a: p.update_scalar_bar_range((50, 200)),
@@ -108,17 +90,12 @@ CHANGES = {
 #: What a VDI cannot honour, and words of what is said.
 REFUSED = {
     "blend_mode": (lambda a: setattr(a.mapper, "blend_mode", "maximum"), "composite blending"),
-    "cell mode": (lambda a: setattr(a.mapper, "scalar_map_mode", "cell"), "SelectScalarArray"),
-    "cell field": (lambda a: a.mapper.SetScalarModeToUseCellFieldData(), "SelectScalarArray"),
-    "mode": (lambda a: a.mapper.SetScalarMode(7), "from 0 to 4; got 7"),
-    "no such array": (lambda a: select(a.mapper, "z"), "no array 'z'"),
     "volume's connection": (
         lambda a: a.mapper.SetInputConnection(a.mapper.GetSource().GetInputConnection(0, 0)),
         "is not a VDI.*VDISource",
     ),
     "sample distance": (lambda a: a.mapper.SetSampleDistance(-1.0), "sample_distance.*got -1.0"),
     "mask": (lambda a: a.mapper.SetMaskInput(image()), "set masked voxels"),
-    "normals": (lambda a: a.mapper.SetComputeNormalFromOpacity(1), "ComputeNormalFromOpacity"),
     "scattering": (lambda a: a.mapper.SetVolumetricScatteringBlending(0.5), "ambient_occlusion"),
     "another mapper": (
         lambda a: setattr(a, "mapper", pv.plotting.mapper.SmartVolumeMapper()),

@@ -71,11 +71,11 @@ def test_a_moving_hand_has_the_machine():
     """Whatever is seen, nothing is begun, and what serves waits."""
     for seen, regenerate, late, draw in product(
         (SEEN, AWAY, POOR, replace(SEEN, content="b"), replace(SEEN, made=None)),
-        ("auto", "never", "ask"),
+        ("auto", "never"),
         (True, False),
         ("auto", "vdi", "volume"),
     ):
-        known = {"regenerate": regenerate, "late": late, "draw": draw, "wish": True}
+        known = {"regenerate": regenerate, "late": late, "draw": draw}
         found = of(seen, hand=True, moving=True, settled=False, **known)
         assert (found.make, found.estimate) == (None, None)
     waits = of(POOR, hand=True, moving=True, making=Making("a", HOME, for_view=True), draw="vdi")
@@ -94,7 +94,6 @@ def test_a_view_at_rest_is_estimated_and_gets_a_vdi_if_it_is_poor():
     good = replace(POOR, estimate=ViewEstimate(1, turned(40), 0.97), draw="vdi")
     assert (plan(good).make, plan(good).estimate) == (None, None)
     assert of(good, view=turned(43)).estimate == "background", "it was of another view"
-    assert of(AWAY, regenerate="ask", wish=True).make == turned(40)
 
 
 def test_vdi_or_volume_whichever_is_better_in_time():
@@ -133,7 +132,6 @@ def test_one_picture_is_the_volumes_and_no_vdi_is_made():
     assert (found.show, found.update, found.in_bricks, found.full) == ("volume", False, True, True)
     assert of(KEPT, made=None, volume="none").update
     assert of(KEPT, made=None, draw="vdi").update
-    assert of(KEPT, made=None, regenerate="ask").update
     assert not of(KEPT, made=None, draw="vdi", failed=True).update
 
 
@@ -167,7 +165,7 @@ def test_whatever_is_seen_is_planned_without_fail():
     """All combinations; who is watched waits for nothing but a first VDI."""
     kinds = {
         "draw": ("auto", "vdi", "volume"),
-        "regenerate": ("auto", "never", "ask"),
+        "regenerate": ("auto", "never"),
         "watched": (False, True),
         "moving": (False, True),
         "joint": (False, True),

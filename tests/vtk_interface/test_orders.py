@@ -84,22 +84,6 @@ def test_a_property_on_the_actor_changes_nothing(off_screen, rgba):
         np.testing.assert_array_equal(scene.picture(), before)
 
 
-def test_an_array_may_be_chosen_before_there_is_an_input(off_screen):
-    pictures = []
-    for ours in (False, True):
-        scene = Scene(ours)
-        scene.mapper.RemoveAllInputs()
-        scene.mapper.SetScalarModeToUsePointFieldData()
-        scene.mapper.SelectScalarArray("w")
-        if ours:
-            scene.mapper.SetInputConnection(scene.source.GetOutputPort())
-        else:
-            scene.mapper.SetInputData(scene.image)
-        pictures.append(scene.picture())
-    assert likeness(*pictures) >= LEAST_SSIM
-    assert compare_images(pictures[1], Scene(True).picture()).ssim < LEAST_SSIM
-
-
 def test_without_its_input_nothing_is_drawn(off_screen):
     scene = Scene(True)
     scene.picture()

@@ -206,9 +206,10 @@ class VDIWidget(anywidget.AnyWidget):
         shown = of_viewers.as_shown(vdi)
         self._file = self._sent(shown)
         self._vdi = shown
-        before, self.time = self.time, None
+        time = None
         if isinstance(shown, VDISeries):
-            self.time = shown.times[shown.nearest(before or 0.0)]
+            time = shown.times[shown.nearest(self.time or 0.0)]
+        self.time = time
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.vdi!r})"

@@ -68,11 +68,6 @@ def test_four_ranks_make_the_vdi_of_the_same_blocks_and_all_say_what_fails(
     assert compare_images(*(pvdi.render(vdi, view) for vdi in (found, whole))).ssim > 0.99
 
 
-@needs_mpi
-def test_whatever_one_rank_is_given_all_raise_the_same_or_none_does(tmp_path, default_runtime):
-    run(2, PROGRAM, "mistakes", tmp_path)
-
-
 @pytest.mark.slow
 @needs_mpi
 def test_a_simulation_writes_a_series(tmp_path):
@@ -179,7 +174,6 @@ def test_what_an_earlier_run_wrote_is_kept_or_continued(tmp_path, scene):
         ({"scene": (volume, camera.azimuth(1), size)}, "its camera is"),
         ({"scene": (volume, camera, (9, 8))}, "its window_size is"),
         ({"clim": (0, 100)}, "classification"),
-        ({"overwrite": True}, "pass one of them"),
     ):
         with pytest.raises(InvalidArgumentError, match=message):
             simulate(path, **{"scene": scene, "times": [9.0], "append": True, **wrong})

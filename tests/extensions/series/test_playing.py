@@ -97,7 +97,7 @@ def test_what_has_no_times_is_refused(plotter, series):
             use()
     one = plotter.add_vdi(series[:1], show_scalar_bar=False)
     for use, error, message in (
-        (lambda: actor.mapper.SetSeries([1, 2]), InvalidArgumentError, "VDISeries"),
+        (lambda: setattr(actor, "series", [1, 2]), InvalidArgumentError, "VDISeries"),
         (lambda: plotter.add_vdi(series, cmap="bone"), UnsupportedError, "cmap cannot be given"),
         (lambda: actor.mapper.SetVDI([series]), InvalidVDIError, "list"),
         (one.regenerate, InvalidArgumentError, "without a volume"),

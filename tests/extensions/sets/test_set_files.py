@@ -31,24 +31,14 @@ def saved(vdis, tmp_path_factory):
     return made.save(tmp_path_factory.mktemp("sets") / "a.vdiset")
 
 
-@pytest.mark.every(2)
-@pytest.mark.parametrize(
-    ("precision", "compression"),
-    [("8-byte", "zstd"), ("8-byte", "none"), ("exact", "deflate")],
-)
-def test_every_view_is_read_to_the_last_bit(precision, compression, vdis, saved, tmp_path):
+def test_every_view_is_read_to_the_last_bit(vdis, saved, tmp_path):
     read = pvdi.read(saved)
     assert isinstance(read, pvdi.VDISet)
     assert read.cameras == tuple(vdi.camera for vdi in vdis)
     assert (read.window_size, read.bounds) == ((40, 30), vdis[0].bounds)
     assert read.camera == vdis[0].camera
-    again = read.save(tmp_path / "b.vdiset", precision=precision, compression=compression)
-    for one, other, vdi in zip(read, pvdi.read(again), vdis, strict=True):
-        assert same(one, vdi)
-        assert same(other, vdi.with_precision(precision))
-
-
-def test_a_view_is_found_and_read_without_another(vdis, saved, tmp_path):
+    assert all(same(one, vdi) for one, vdi in zip(read, vdis, strict=True))
+    # A view is found and read without another
     with zipfile.ZipFile(saved) as archive:
         archive.extractall(tmp_path / "a.vdiset")
     for k in (0, 1, 2, 3, 5):
@@ -63,14 +53,7 @@ def test_a_view_is_found_and_read_without_another(vdis, saved, tmp_path):
 
 @pytest.mark.parametrize(
     "changes",
-    [
-        {"views": None},
-        {"views": []},
-        {"picture_size": [0, 1]},
-        {"bounds": [1, 2]},
-        {"camera": 3},
-        {"version": 2},
-    ],
+    [{"views": []}, {"picture_size": [0, 1]}, {"bounds": [1, 2]}, {"camera": 3}, {"version": 2}],
 )
 def test_what_the_json_says_wrongly_is_refused(changes, saved, tmp_path):
     with zipfile.ZipFile(saved) as archive:
@@ -86,7 +69,7 @@ def test_foreign_files_and_names(saved, vdis, tmp_path):
     for name, content, message in (
         ("b.vdiset", other.read_bytes(), r"no set\.json"),
         ("c.vdis", saved.read_bytes(), r"no series\.json"),
-        ("d.vdiset", b"\x89VDIV\r\n\x1a" + bytes(40), "earlier format"),
+        ("d.vdiset", bytes(40), "no set of VDIs"),
     ):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(VDIFileError, match=message):
@@ -97,5 +80,3 @@ def test_foreign_files_and_names(saved, vdis, tmp_path):
         pvdi.VDISet(vdis).save(tmp_path / "a.vdi")
     with pytest.raises(InvalidArgumentError, match="compression"):
         pvdi.VDISet(vdis).save(tmp_path / "a.vdiset", compression="zip")
-    with pytest.raises(InvalidArgumentError, match="option"):
-        pvdi.read(saved, thickness=3)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import threading
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from plugin_scenes import CLASSIFICATION, soft_ball
 from watched_windows import finish, frame, picture_of, turned
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.extensions.sets import shown as of_sets
+from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.model.standard_cases import filling_camera
 
 
 @pytest.fixture(scope="module")
@@ -24,20 +21,6 @@ def once(default_runtime):
 def made(once):
     """The same set, which may be blended otherwise without the others' seeing it."""
     return pvdi.VDISet(list(once), window_size=once.window_size)
-
-
-@pytest.fixture
-def decoded(monkeypatch):
-    """Which VDIs are taken out of sets, and in which thread."""
-    taken, get = [], pvdi.VDISet.__getitem__
-
-    def noting(vdi_set, index):
-        if isinstance(index, int):
-            taken.append((index, threading.current_thread() is threading.main_thread()))
-        return get(vdi_set, index)
-
-    monkeypatch.setattr(pvdi.VDISet, "__getitem__", noting)
-    return taken
 
 
 def shown(plotter, vdi_set, **options):
@@ -83,49 +66,61 @@ def test_between_two_a_blend_is_drawn(plotter, made):
     assert np.abs(alone - mean).max() > 8
 
 
-def test_a_set_from_a_file_is_decoded_ahead(plotter, made, decoded, tmp_path):
-    read = pvdi.read(made.save(tmp_path / "a.vdiset"))
-    decoded.clear()
-    actor = shown(plotter, read, regenerate="never")
+def test_a_set_from_a_file_is_read_ahead_as_far_as_memory_goes(plotter, made, tmp_path):
+    actor = shown(plotter, pvdi.read(made.save(tmp_path / "a.vdiset")), regenerate="never")
     finish("set")
-    wanted = min(8, len(read))
-    nearest = np.argsort(read.distances(plotter.camera), kind="stable")[:wanted].tolist()
-    assert set(nearest) <= {i for i, _ in decoded}
-    decoded.clear()
-    turned(plotter, 5)
-    finish("set")
-    assert not any(in_frame for _, in_frame in decoded), "a frame has waited"
-    actor.mapper.driver.release()
-    decoded.clear()
-    frame(plotter)  # begins anew
-    finish("set")
-    assert decoded
-
-
-def test_with_little_memory_what_is_drawn_stays(plotter, made, decoded, monkeypatch):
-    monkeypatch.setattr(of_sets, "MEMORY", 1.0)
-    shown(plotter, made, regenerate="never")
-    drawn = []
-    for _ in range(5):
+    held = actor.mapper.driver.input
+    assert len(held.on_devices()) == 1 + 8
+    held.memory = 1.0
+    for _ in range(3):
         turned(plotter, 50)
         finish("set")
-        drawn.append({i for i, _ in made.weights(plotter.camera)})
-        decoded.clear()
-        turned(plotter, 1e-6)
-        assert not drawn[-1] & {i for i, in_frame in decoded if in_frame}
-    assert any(later - before for before, later in pairwise(drawn))
-    decoded.clear()
-    turned(plotter, -200)
-    gone = {i for i, _ in made.weights(plotter.camera)} - drawn[-1]
-    # All but one that was decoded ahead
-    assert len(gone - {i for i, _ in decoded}) <= 1
+    assert len(held.on_devices()) == 1 + 3  # as many as are blended
+    np.testing.assert_array_equal(frame(plotter), picture_of(held.collection, plotter))
 
 
-def test_a_set_makes_no_vdi_at_rest(plotter, made):
-    actor, n = shown(plotter, made), len(made)
-    for _ in range(3):
-        frame(plotter)
-        finish("set")
-    assert (len(made), actor.status.stand_in) == (n, False)
-    with pytest.raises(InvalidArgumentError, match="without a volume"):
-        actor.regenerate()
+DEFERRED = {"classification": "deferred", "value_range": (1, 250), "precision": "8-byte"}
+SIZE, LOOK = (60, 50), {"cmap": "bone", "opacity": [0, 0.2, 0.9], "clim": (20, 220)}
+CAMERA = filling_camera((-1, 1, -1, 1, -1, 1), SIZE)
+
+
+@pytest.fixture(scope="module")
+def views(default_runtime):
+    views = (CAMERA, CAMERA.azimuth(30))
+    return [pvdi.generate(soft_ball(12), view, SIZE, **DEFERRED) for view in views]
+
+
+@pytest.fixture(scope="module")
+def saved(views, tmp_path_factory):
+    return pvdi.VDISet(views).save(tmp_path_factory.mktemp("set") / "ball.vdiset")
+
+
+@pytest.mark.filterwarnings("ignore:the transfer function shows values outside")
+def test_what_is_read_and_rendered_is_that_of_each_view(views, saved, tmp_path):
+    found = pvdi.read(saved)
+    assert all(one.equals(other) for one, other in zip(found, views, strict=True))
+    assert found.value_range == (1, 250)
+    baked = pvdi.VDISet([view.classified(**LOOK) for view in views])
+    view = CAMERA.azimuth(12)
+    expected = pvdi.render(baked, view)
+    assert np.array_equal(pvdi.render(found.classified(**LOOK), view), expected)
+    assert np.array_equal(pvdi.render(found, view, **LOOK), expected)
+    for refused in (lambda: pvdi.render(found, view), lambda: found.save(tmp_path / "a.html")):
+        with pytest.raises(InvalidVDIError, match="no colours yet"):
+            refused()
+    with pytest.raises(InvalidVDIError, match="number 1 has colours"):
+        pvdi.VDISet([views[0], baked[1]])
+    with pytest.raises(TypeError, match="generate_set.*generate_series"):
+        pvdi.generate_set(soft_ball(12), window_size=SIZE, classification="deferred")
+
+
+def test_its_property_is_followed_in_a_plotter(plotter, saved):
+    actor = plotter.add_vdi(str(saved), show_scalar_bar=False, **LOOK)
+    plotter.show(auto_close=False)
+    pictures = []
+    for _ in range(2):
+        values = [view.classified(volume_property=actor.prop) for view in pvdi.read(saved)]
+        pictures.append(frame(plotter))
+        assert np.abs(pictures[-1] - picture_of(pvdi.VDISet(values), plotter)).max() <= 1
+        actor.prop.GetScalarOpacity().AddPoint(60, 1.0)
+    assert np.abs(pictures[1] - pictures[0]).max() > 8

@@ -15,17 +15,12 @@ SIZE = (32, 24)
 
 
 @pytest.fixture(scope="module")
-def volume(tmp_path_factory):
-    path = tmp_path_factory.mktemp("volume") / "v.npy"
-    z, y, x = np.mgrid[:9, :9, :9] - 4
-    np.save(path, (250 * np.exp(-(x**2 + 2 * y**2 + z**2) / 9)).astype(np.uint8))
-    return path
-
-
-@pytest.fixture(scope="module")
-def saved(volume, tmp_path_factory, default_runtime):
+def saved(tmp_path_factory, default_runtime):
     pytest.importorskip("pyvista")
     path = tmp_path_factory.mktemp("sets") / "a.vdiset"
+    volume = path.with_name("v.npy")
+    z, y, x = np.mgrid[:9, :9, :9] - 4
+    np.save(volume, (250 * np.exp(-(x**2 + 2 * y**2 + z**2) / 9)).astype(np.uint8))
     options = "--size 32x24 --cmap bone --lists 1 --max-supersegments 3 --half-angle 120"
     assert cli.main(["set", str(volume), "-o", str(path), *options.split(), "--views", "9"]) == 0
     return path
@@ -41,15 +36,8 @@ def test_a_volume_becomes_a_set(saved, capsys):
     assert len(state["views"]) == len(vdis)
 
 
-@pytest.mark.gl
-def test_it_is_viewed(saved, capsys, tmp_path):
-    assert "written" in run(capsys, "view", saved, "--screenshot", tmp_path / "v.png")
-
-
-def test_it_is_converted(saved, capsys, tmp_path):
+def test_it_is_viewed_and_converted(saved, capsys, tmp_path):
     vdis = pvdi.read(saved)
-    again = tmp_path / "b.vdiset"
-    run(capsys, "convert", saved, "-o", again, "--compression", "deflate")
-    assert all(one.equals(two) for one, two in zip(pvdi.read(again), vdis, strict=True))
     run(capsys, "convert", saved, "-o", tmp_path / "a.html")
     assert len(pvdi.read(tmp_path / "a.html")) == len(vdis)
+    assert "written" in run(capsys, "view", saved, "--screenshot", tmp_path / "v.png")

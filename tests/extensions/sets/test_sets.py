@@ -49,12 +49,11 @@ def directions(n):
 
 
 def test_directions_are_spread_within_an_angle_of_an_axis():
-    # The best coverings that are known: of 12 points 37.4, of 32 points 22.7 degrees
-    for n, most in ((12, 46), (32, 28)):
-        nearest = (directions(800 * n) @ directions(n).T).max(axis=1)
-        assert np.degrees(np.arccos(nearest.min())) < most
+    # The best covering that is known of 32 points: 22.7 degrees
+    nearest = (directions(25600) @ directions(32).T).max(axis=1)
+    assert np.degrees(np.arccos(nearest.min())) < 28
     axis = np.array([1.0, -2.0, 0.5])
-    for n in (1, 2, 7, 50):
+    for n in (1, 7):
         found = spread(n, axis, 40)
         assert np.allclose(np.linalg.norm(found, axis=1), 1)
         cosines = found @ axis / np.linalg.norm(axis)
@@ -69,53 +68,31 @@ def test_the_nearest_is_that_of_the_least_angle(made, around):
         assert made.nearest(view) == int(np.argmin(angles))
 
 
-def test_an_actor_that_is_turned_takes_its_views_along(made, around):
-    turn = np.eye(4)
-    turn[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
-    turn[:3, 3] = (5, 6, 7)
-    for view in orbit(around, made.bounds, directions(5)):
-        moved = view.replace(
-            position=turn[:3, :3] @ view.position + turn[:3, 3],
-            focal_point=turn[:3, :3] @ view.focal_point + turn[:3, 3],
-            view_up=turn[:3, :3] @ view.view_up,
-            model_transform=turn,
-        )
-        assert np.allclose(made.distances(moved), made.distances(view), atol=1e-6)
-
-
-def test_of_two_eyes_in_a_line_the_one_at_that_distance_is_nearest(volume, around):
+def test_of_two_eyes_in_a_line_the_one_at_that_distance_is_nearest(made, around):
     centre = np.asarray(around.focal_point)
-    near, far = (
-        around.replace(position=centre + k * np.subtract(around.position, centre)) for k in (1, 3)
-    )
-    vdis = [
-        pvdi.generate(volume, view, (16, 9), transfer_function=_table(), max_supersegments=2)
-        for view in (near, far)
-    ]
-    both = pvdi.VDISet(vdis)
-    assert both.nearest(near) == 0
-    assert both.nearest(far) == 1
+    vdi = made[0]
+
+    def at(k):
+        return around.replace(position=centre + k * np.subtract(around.position, centre))
+
+    both = pvdi.VDISet([vdi, vdi], [at(1), at(3)])
+    assert both.nearest(at(1)) == 0
+    assert both.nearest(at(3)) == 1
     # Twice as far is ln 2, as if turned by that angle
     for k in (2, 1e300):
-        away = around.replace(position=centre + k * np.subtract(around.position, centre))
-        assert both.distances(away)[0] == pytest.approx(np.degrees(np.log(k)), rel=1e-6)
+        assert both.distances(at(k))[0] == pytest.approx(np.degrees(np.log(k)), rel=1e-6)
 
 
 def test_weights_add_up_and_nothing_jumps_on_a_path(made, around):
     # In steps of .05 degrees a distance changes by that at most, a share by twice that over the
     # reach: at least a few hundredths of a degree but where three others are as near
-    previous = None
-    for azimuth in np.arange(0, 20, 0.05):
-        view = around.azimuth(azimuth)
-        weights = made.weights(view)
-        assert weights[0][0] == made.nearest(view)
-        assert sum(w for _, w in weights) == pytest.approx(1)
+    path = [made.weights(around.azimuth(azimuth)) for azimuth in np.arange(0, 20, 0.05)]
+    dense = np.zeros((len(path), len(made)))
+    for step, weights in enumerate(path):
         assert 1 <= len(weights) <= 3
-        dense = np.zeros(len(made))
-        dense[[i for i, _ in weights]] = [w for _, w in weights]
-        if previous is not None:
-            assert np.abs(dense - previous).max() < 0.1
-        previous = dense
+        dense[step, [i for i, _ in weights]] = [w for _, w in weights]
+    assert np.allclose(dense.sum(axis=1), 1)
+    assert np.abs(np.diff(dense, axis=0)).max() < 0.1
 
 
 def test_a_picture_is_the_weighted_mean(made, around):
@@ -128,37 +105,19 @@ def test_a_picture_is_the_weighted_mean(made, around):
     assert blended > 3  # or the test shows nothing
 
 
-def test_pick_and_depth_are_those_of_the_nearest(made, around):
-    view = around.azimuth(20)
+def test_pick_depth_and_a_joint_scene_are_those_of_the_nearest(made, around):
+    view, middle = around.azimuth(20), (SIZE[0] // 2, SIZE[1] // 2)
     nearest = made[made.nearest(view)]
-    middle = (SIZE[0] // 2, SIZE[1] // 2)
     assert pvdi.pick(made, view, middle) == pvdi.pick(nearest, view, middle, SIZE)
-    assert pvdi.pick(made, view, middle) is not None
     assert np.array_equal(pvdi.render_depth(made, view), pvdi.render_depth(nearest, view, SIZE))
-
-
-def test_a_set_beside_a_vdi_in_one_scene(made, around):
-    aside = np.eye(4)
-    aside[0, 3] = 30
-    view = around.azimuth(20)
-    nearest = made[made.nearest(view)]
-    placed = {"model_transforms": [np.eye(4), aside], "window_size": SIZE}
-    together = pvdi.render([made, made[0]], view, **placed)
-    assert np.array_equal(together, pvdi.render([nearest, made[0]], view, **placed))
+    together = pvdi.render([made, made[0]], view, window_size=SIZE)
+    assert np.array_equal(together, pvdi.render([nearest, made[0]], view, window_size=SIZE))
 
 
 def test_a_vdi_of_a_set_is_what_generate_makes(made, volume):
     vdi = made[0]
-    alone = pvdi.generate(
-        volume,
-        vdi.camera,
-        vdi.window_size,
-        transfer_function=_table(),
-        max_supersegments=8,
-        settings=pvdi.Settings(view_cone=30),
-        precision="8-byte",
-    )
-    assert vdi.precision == "8-byte"
+    how = {"settings": pvdi.Settings(view_cone=30), "precision": "8-byte", "max_supersegments": 8}
+    alone = pvdi.generate(volume, vdi.camera, vdi.window_size, transfer_function=_table(), **how)
     assert vdi.equals(alone)
 
 
@@ -180,13 +139,11 @@ def test_views_are_spread_in_a_cone_or_those_that_are_given(volume, around, defa
 @pytest.mark.parametrize(
     ("changes", "error", "said"),
     [
-        ({"views": "cube"}, InvalidArgumentError, "views"),
         ({"views": []}, InvalidArgumentError, "no view"),
         ({"views": 0}, InvalidArgumentError, "views"),
         ({"half_angle": 181}, InvalidArgumentError, "half_angle"),
         ({"lists": 0}, InvalidArgumentError, "lists"),
         ({"views": [VIEW], "camera": VIEW}, InvalidArgumentError, "camera and half_angle"),
-        ({"oppacity": "linear"}, TypeError, "oppacity"),
         ({"quality": "high"}, TypeError, "quality"),
         ({"progress": lambda _: False}, Cancelled, None),
     ],
@@ -208,6 +165,7 @@ def test_what_is_no_set_is_refused(made):
         pvdi.VDISet([made[0], other])
     with pytest.raises(IndexError, match=r"is out of range: there are \d+ VDIs"):
         made[len(made)]
-    assert [vdi is made[i] for i, vdi in enumerate(made)] == [True] * len(made)
-    assert made[1:3] == [made[1], made[2]]
-    assert f"{len(made)} VDIs" in repr(made)
+    made = pvdi.VDISet(list(made))
+    made.blend = 181
+    with pytest.raises(InvalidArgumentError, match="blend must be degrees, 0 to 180; got 181"):
+        made.weights(VIEW)

@@ -1,7 +1,6 @@
 """Scenes in a page: what is seen among VDIs is what VTK draws of the same plotter."""
 
 import io
-import re
 import warnings
 
 import numpy as np
@@ -217,16 +216,6 @@ def test_export_html_writes_a_page_that_shows_the_scene(plotter, from_disk, tmp_
     assert page.evaluate("viewer.camera") == view
     vdi = plotter.volume.vdi
     assert pvdi.read(path).equals(vdi.with_precision("8-byte"))
-
-
-def test_without_a_name_the_page_is_returned(plotter):
-    ball(plotter)
-    stream = plotter.vdi.export_html(None)
-    assert isinstance(stream, io.StringIO)
-    text = stream.read()
-    assert text.startswith("<!doctype html>")
-    assert "application/vdi-scene+base64" in text
-    assert not re.search(r"(src|href)=.?https?:", text)
 
 
 def test_what_is_not_shown_is_named_in_one_warning(plotter):
