@@ -69,10 +69,10 @@ def no_estimates(monkeypatch):
         def __init__(self, *_, **__):
             pass
 
-        def estimate(self, vdi, camera, size, **shown):
+        def estimate(self, vdi, camera, size, *shown, **more):
             answer.asked += 1
             answer.camera, answer.shown = camera, shown
-            return ViewError(answer.ssim, 0.0, 0.0, 1.0, 1)
+            return ViewError(answer.ssim, 0.0, 1.0, 1)
 
     monkeypatch.setattr(making, "ViewErrorEstimator", Estimator)
     return answer
