@@ -106,5 +106,3 @@ def test_shadows_are_drawn_as_over_a_volume():
     judge = seen_under(Plotter.enable_shadows, add_judge)
     ours = seen_under(Plotter.enable_shadows, add_ours)
     assert np.abs(ours - judge).max() <= TOLERANCE
-
-
