@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidVDIError, UnsupportedError, VDIWarning
+from pyvista_vdi.errors import UnsupportedError, VDIWarning
 
 pv = pytest.importorskip("pyvista")
 
@@ -117,12 +117,6 @@ def test_shading_that_is_switched_on_later_is_refused_in_a_sentence(default_runt
     actor.prop.shade = False
     actor.prop.GetScalarOpacity().AddPoint(100, 1.0)
     assert np.abs(seen(plotter) - before).mean() > 0.2
-
-
-def test_a_mapper_names_the_remedy(default_runtime, plotter):
-    kept = pvdi.generate(volume(), plotter.camera, (48, 36), classification="deferred")
-    with pytest.raises(InvalidVDIError, match="classified"):
-        pvdi.VDIMapper().SetInputData(kept)
 
 
 def test_picks_and_the_vdi_have_the_look_of_now(default_runtime, plotter):

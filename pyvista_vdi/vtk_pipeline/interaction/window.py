@@ -156,13 +156,6 @@ class Window:
 
     # What is seen of it
 
-    def render(self) -> None:
-        """Draw the window, as from its event loop."""
-        window = self._window()
-        interactor = None if window is None else window.GetInteractor()
-        if interactor is not None:
-            interactor.Render()
-
     def watched_behind(self, settings: Any) -> bool:
         """Whether work may go on behind the frames: somebody watches, and can move."""
         window = self._window()
