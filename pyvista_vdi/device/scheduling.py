@@ -132,8 +132,7 @@ class Turns:
     ) -> Iterator[None]:
         """Work inside the ``with`` block only when no frame is in progress.
 
-        The device's launches and copies are cut into pieces that take no longer than a turn; each
-        is finished when the call returns. Nor while ``paused()`` is true: frames then wait for nothing of it. Launches and copies are
+        Nor while ``paused()`` is true: frames then wait for nothing of it. Launches and copies are
         cut into pieces that take no longer than a turn; each is finished when the call returns.
         ``cancelled`` is asked between pieces: True ends the work with :class:`Cancelled`.
         """
