@@ -24,6 +24,7 @@ fi
 results=()
 failed=0
 status=0 # of the last step
+processors=0 # seconds of it
 
 log() { printf '%s\n' "-- $*"; }
 
@@ -48,7 +49,7 @@ step() {
 # report NAME STATUS SECONDS TIMES: the last is a file with what `times` printed. Steps that run beside
 # each other take longer by the others, but no more of the processors.
 report() {
-    local word=passed processors
+    local word=passed
     processors=$(awk 'NR == 2 { gsub(/[ms]/, " "); print int($1 * 60 + $2 + $3 * 60 + $4) }' "$4")
     (($2 == 0)) || word=FAILED failed=1
     results+=("$(printf '%s  %-22s %5d s, %5d s of processors' "$word" "$1" "$3" "$processors")")

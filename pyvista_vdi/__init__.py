@@ -20,7 +20,6 @@ _HOMES = {
     "Camera": "model.camera",
     "DeferredVDI": "model.deferred",
     "Cropping": "model.cropping",
-    "Estimate": "generation.slices",
     "Light": "model.lighting",
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",
@@ -37,7 +36,7 @@ _HOMES = {
     "list_volumes": "io.volumes",
     "presets": "model.presets",
     "read_volume": "io.volumes",
-    **dict.fromkeys(("Settings", "estimate", "generate", "pick", "read"), "api"),
+    **dict.fromkeys(("Settings", "generate", "pick", "read"), "api"),
     **dict.fromkeys(("render", "render_depth", "render_volume"), "api"),
     **dict.fromkeys(errors.__all__, "errors"),
 }
@@ -59,8 +58,8 @@ registry.core = registry.Extension(
     },
     methods={
         "Camera.to_pyvista": "pyvista_vdi.plotting.imports:camera_to_pyvista",
-        "DeferredVDI.classified": "pyvista_vdi.api.deferred:classified",
-        "VDICollection.classified": "pyvista_vdi.api.deferred:classified_each",
+        "DeferredVDI.classified": "pyvista_vdi.api.vdis:classified",
+        "VDICollection.classified": "pyvista_vdi.api.vdis:classified_each",
         "TransferFunction.from_arguments": (
             "pyvista_vdi.plotting.classify:transfer_function_from_arguments"
         ),

@@ -174,15 +174,10 @@ def path(name: str) -> Path:
             f"pyvista_vdi/data/{example.file_name} is missing from the installed package: "
             "install pyvista-vdi again"
         )
-    folder = os.environ.get(DATA_VARIABLE)
-    where = (
-        f"the folder {folder!r} that {DATA_VARIABLE} names does not hold it"
-        if folder
-        else f"the environment variable {DATA_VARIABLE} is not set"
-    )
     raise DataNotFoundError(
-        f"the volume {name!r} is not shipped with pyvista-vdi and {where}: put "
-        f"{example.file_name} into a folder and set {DATA_VARIABLE} to that folder"
+        f"the volume {name!r} is not shipped, and the folder that {DATA_VARIABLE} names, "
+        f"{os.environ.get(DATA_VARIABLE)!r}, does not hold it: put {example.file_name} into a "
+        "folder, and set the variable to that"
     )
 
 

@@ -7,8 +7,6 @@ PYVISTA_VDI_TEST_DEVICES
     contain one; "all": on every usable one. By default on the one that users get.
 PYVISTA_VDI_TEST_AS_GPU
     "1": devices pass for GPUs, and clang checks each program for one (tests/support/as_gpu.py).
-PYVISTA_VDI_TEST_WHOLE
-    "1": the slow tests measure all cases of the standard table, an hour, in place of a sample.
 PYVISTA_VDI_REQUIRE_DEVICE
     "1": having no usable device is a failure, as in CI; otherwise such tests are skipped.
 PYVISTA_VDI_REQUIRE_INSTALLED
@@ -20,14 +18,12 @@ HYPOTHESIS_PROFILE
 from __future__ import annotations
 
 import functools
-import inspect
 import locale
 import os
 import re
 import signal
 import sysconfig
-import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import as_gpu
@@ -122,46 +118,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     )
 
 
-#: Files, by rooms, that take long together: ``-m fast`` runs one case of each of their tests.
-LENGTHY = {
-    "api": "api engine_errors",
-    "cli": "cli wrong_values",
-    "deep_exr": "deep_exr",
-    "extremes": "entries media scenes vdis views volumes",
-    "faults": "device_faults",
-    "generation": "generation_oracle march_blocks records",
-    "io": "vdi_files",
-    "large": "blocks",
-    "measure": "benchmark_scripts baselines",
-    "model": "packing",
-    "plotting": "add_vdi as_added dial shown volume_files",
-    "quality": "view_error",
-    "raycasting": "aligned_view cropping multi_vdi_oracle occupancy packets picking_oracle preview "
-    "raycast_oracle skipping",
-    "reference": "reference",
-    "series": "on_device series_files",
-    "volume": "ambient_occlusion bricks lighting picture_blocks projections sampling_functions "
-    "volume_ends",
-    "vtk_pipeline": "copies events picking pipeline random_chains source vtk_files",
+#: Folders, and files, that ``-m fast`` leaves out: their tests are long, or start processes.
+LONG = {
+    *("drop_in", "extremes", "faults", "fuzz", "measure", "packaging", "plotting", "vtk_pipeline"),
+    *("insitu", "large", "paraview", "series", "sets", "web", "test_process", "test_background"),
 }
-
-#: And those of which it runs none.
-LENGTHIEST = {
-    "drop_in": "arguments changes data neighbours views",
-    "extremes": "determinism",
-    "faults": "disk_faults interrupts threads_and_forks",
-    "fuzz": "fuzz",
-    "large": "dask",
-    "measure": "compare lighting_against_vtk real_volumes tradeoff",
-    "packaging": "distributions documentation",
-    "plotting": "example_scripts in_browser on_screen scenes",
-    "quality": "background dial",
-    "vtk_pipeline": "long_load overlap previews regeneration",
-    "web": "notebook server",
-}
-
-#: Names in a function that starts a process.
-STARTERS = frozenset({"subprocess", "multiprocessing", "run_python", "fork"})
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -172,38 +133,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         needed = {name for mark in item.iter_markers("extension") for name in mark.args}
         if not needed <= {*registry.extensions()}:
             item.add_marker(pytest.mark.skip(f"needs the extension {', '.join(sorted(needed))}"))
-        some = item.get_closest_marker("every")
-        if some is not None:
-            # By the case's name: other cases on another device, the same in every process
-            chosen = zlib.crc32(item.name.encode()) % some.args[0] == 0
-            if not chosen and item.function in seen:
-                item.add_marker("slow")
         if any(map(item.get_closest_marker, ("slow", "paraview"))):
             continue
         if "runtime" in getattr(item, "fixturenames", ()):
             item.add_marker("device")
-        room, name = item.path.parent.name, item.path.stem.removeprefix("test_")
-        another_case = item.function in seen and name in LENGTHY.get(room, "").split()
+        if item.function not in seen and LONG.isdisjoint((item.path.parent.name, item.path.stem)):
+            item.add_marker("fast")  # one case of each test
         seen.add(item.function)
-        left_out = another_case or name in LENGTHIEST.get(room, "").split()
-        in_a_browser = "chromium" in getattr(item, "fixturenames", ())
-        if not left_out and not in_a_browser and not starts_a_process(item.function):
-            item.add_marker("fast")
-
-
-@functools.cache
-def starts_a_process(function: Callable[..., object]) -> bool:
-    """Whether a test, or a function of its module that it calls, names what starts processes."""
-    code = inspect.unwrap(function).__code__
-    names = {*code.co_names}
-    for inner in filter(inspect.iscode, code.co_consts):
-        names.update(inner.co_names)
-    called = (function.__globals__.get(name) for name in names - {code.co_name})
-    return bool(names & STARTERS) or any(
-        starts_a_process(each)
-        for each in called
-        if inspect.isfunction(each) and each.__module__ == function.__module__
-    )
 
 
 def no_device(reason: str) -> None:

@@ -106,10 +106,17 @@ repair_plugin_loader() {
     fi
 }
 
-check_plugin() {
-    "$folder/bin/pyvista-vdi" paraview --check "$pvpython" ||
-        fail "ParaView can make no VDI with $folder as it is: see above"
-}
+check_plugin() (
+    eval "$("$folder/bin/pyvista-vdi" paraview --environment)"
+    "$pvpython" -c '
+import os
+from paraview import simple
+import pyvista_vdi
+simple.VDISource, simple.VDIToImage, simple.VDIReader
+print(pyvista_vdi.describe_devices(), flush=True)
+os._exit(not any(device.usable for device in pyvista_vdi.list_devices()))
+' || fail "ParaView can make no VDI with $folder as it is: see above"
+)
 
 say_how() {
     printf '\nStart ParaView (or pvpython, pvbatch, pvserver) from a shell after\n\n'

@@ -13,7 +13,7 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.arguments import Raw, refuse_unknown, takes
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag
-from pyvista_vdi.model.classification import BLENDINGS, IN_PLACE, Classification
+from pyvista_vdi.model.classification import IN_PLACE, Classification
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, as_volume
@@ -275,9 +275,6 @@ def render_volume(
         Width and height in pixels.
     opaque_depth : array_like of float32, shape (H, W), optional
         As for :func:`render`.
-    blending : {"composite", "maximum", "minimum", "average", "additive"}
-        As in ``add_volume``: the greatest or the least scalar is classified; or opacity times
-        scalar is averaged or integrated over opacity unit distances, as a grey value.
     early_termination : bool
         Stop a ray where what is behind can no longer be seen.
     device : str, int or device, optional
@@ -295,12 +292,13 @@ def render_volume(
     InvalidVolumeError, InvalidCameraError, InvalidArgumentError
         If an argument cannot be used.
     UnsupportedError
-        If ``blending`` does not go with another argument, or for what else cannot be honoured.
+        If another blending mode is asked for, or what else cannot be honoured.
     MissingDependencyError
         If a colour map or an opacity is named and PyVista is not installed.
     NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
         If there is no device, or it fails.
     """
+    look.require_composite()
     view, read = Camera.from_any(camera), as_volume(volume, look.scalars, look.preference)
     drawn = options.drawn()
     if not as_flag(early_termination, "early_termination"):
@@ -313,10 +311,6 @@ def render_volume(
         opaque_depth,
         device,
     )
-    if look.blending != BLENDINGS[0]:
-        from pyvista_vdi.volume.render import project_volume
-
-        return project_volume(read, table, request, look.blending, medium)
     from pyvista_vdi.volume.render import raycast_volume
 
     return raycast_volume(read, table, request, medium)

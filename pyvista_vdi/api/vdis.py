@@ -1,18 +1,30 @@
-"""Generate a VDI, say what that takes, and read one: the public functions that need no picture."""
+"""Generate, read and classify a VDI: the public functions that need no picture."""
 
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from functools import partial
+from types import SimpleNamespace
+from typing import Any
 
-from pyvista_vdi.errors import warn_external
-from pyvista_vdi.model.arguments import takes
+import numpy as np
+
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, warn_external
+from pyvista_vdi.model.arguments import refuse_unknown, takes
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.levels import nearest_depth
-from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest, QualityTarget
+from pyvista_vdi.model.options import (
+    Deferral,
+    GenerationOptions,
+    GenerationRequest,
+    QualityTarget,
+    declared,
+)
+from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import (
     CameraLike,
     ClientLike,
@@ -22,9 +34,7 @@ from pyvista_vdi.model.types import (
     WindowSize,
 )
 from pyvista_vdi.model.vdi import VDI
-
-if TYPE_CHECKING:
-    from pyvista_vdi.generation.slices import Estimate
+from pyvista_vdi.raycasting.classified_values import classify_on_device
 
 
 @takes(
@@ -136,52 +146,6 @@ def generate(
     return vdi
 
 
-@takes(look=Classification, options=GenerationOptions)
-def estimate(
-    volume: VolumeLike,
-    window_size: WindowSize,
-    look: Classification,
-    options: GenerationOptions,
-    *,
-    device: DeviceLike | None = None,
-) -> Estimate:
-    """Return how much memory generating a VDI takes, before it is taken.
-
-    Parameters
-    ----------
-    volume : pyvista.ImageData or vtkImageData or Volume
-        What the VDI would be made of. Scalars whose range is narrow for how far it is from 0 take
-        four bytes each.
-    window_size : (int, int)
-        Width and height in pixels.
-    device : str, optional
-        As for :func:`generate`: a GPU makes more of a VDI at a time.
-
-    Returns
-    -------
-    Estimate
-        Bytes of the volume, of the VDI at worst, of the working buffers, and their sum.
-
-    Raises
-    ------
-    InvalidVolumeError, InvalidArgumentError
-        If an argument cannot be used.
-    NoDeviceError
-        If there is no usable device, or not the one that was asked for.
-    """
-    look.require_composite()
-    read = as_volume(volume, look.scalars, look.preference)
-    from pyvista_vdi.generation.slices import estimate as estimate_bytes
-
-    return estimate_bytes(
-        read,
-        window_size,
-        options,
-        transfer_function=look.transfer_function_of(read),
-        device=device,
-    )
-
-
 def read(path: str | os.PathLike[str], **options: Any) -> VDI | DeferredVDI | VDICollection:
     """Read a VDI from a file that :meth:`VDI.save` wrote, or any deep OpenEXR image.
 
@@ -220,3 +184,41 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI | DeferredVDI | VD
     from pyvista_vdi.io import read as read_file
 
     return read_file(path, **options)
+
+
+#: What says which scalars were seen, and how: that was said where they were kept.
+_SAID_BEFORE = ("scalars", "preference", "interpolation")
+
+
+def classified(deferred: DeferredVDI, look: Mapping[str, Any]) -> VDI:
+    """Return what :meth:`DeferredVDI.classified` does."""
+    return classify_on_device(deferred, _table_of(look, deferred.value_range), look.get("device"))
+
+
+def classified_each(collection: VDICollection, look: Mapping[str, Any]) -> VDICollection:
+    """Return what :meth:`VDICollection.classified` does."""
+    ends = collection.value_range
+    if ends is None:
+        raise InvalidVDIError(
+            "these VDIs have colours already: a look is for those that keep values, which "
+            "classification='deferred' makes"
+        )
+    table, device = _table_of(look, ends), look.get("device")
+    made: Any = partial(classify_on_device, transfer_function=table, device=device)  # is pickled
+    return collection._mapped(made)
+
+
+def _table_of(look: Mapping[str, Any], ends: tuple[float, float]) -> TransferFunction:
+    """Return the transfer function of a look, for values of a range."""
+    refuse_unknown(look, "classified", (*declared(Classification), "device"))
+    asked = Classification(**{name: value for name, value in look.items() if name != "device"})
+    asked.require_composite()
+    for name in _SAID_BEFORE:
+        if name in asked.given:
+            raise InvalidArgumentError(
+                f"{name} was said where the values were kept: give it to pyvista_vdi.generate, "
+                "and leave it out here"
+            )
+    # The range of the values stands for those of the volume
+    values: Any = SimpleNamespace(array=np.array(ends), rgba=False, finite_range=lambda: ends)
+    return asked.transfer_function_of(values)

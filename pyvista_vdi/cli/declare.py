@@ -119,8 +119,6 @@ azimuth=0           DEGREES   turn by
 elevation=0         DEGREES   lift by
 tf                  {tf}      a standard transfer function; --cmap and --opacity change its parts
 transfer_function   FILE      TransferFunction.to_dict() as JSON; needs no PyVista
-occlusion_radius    LENGTH    how far something hides (default: 0.05 of the bounds' diagonal)
-occlusion_strength  S         0 to 1, which is darkest (default: 0.1)
 memory_limit        SIZE      of the device, like 2GiB; what does not fit goes there in bricks
 criterion           NAME      where a list is cut: least-error (default) or homogeneity
 max_bytes           SIZE      most bytes of the VDI on the device, like 20MB
@@ -147,16 +145,14 @@ _GROUPS = {
         tf cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale
         transfer_function""",
     "deferral": """[classified afterwards] Scalars are stored; render, view, convert take looks.
-        classification value_range importance""",
-    "occlusion": """[ambient occlusion] Either option below turns it on, too.
-        ambient_occlusion occlusion_radius occlusion_strength""",
+        classification value_range""",
 }
 _GROUPS["table"] = f"{_GROUPS['look']} transfer_function"
 
 _VDI = "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, or a page, .html"
 _VOLUME = (
-    "a file (.nii.gz, .nrrd, .mha, .tif, .h5, .vti, .npy, ...), a folder of slices (DICOM, "
-    "TIFF or PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
+    "a file (.nii.gz, .nrrd, .mha, .tif, .h5, .vti, .npy, ...), a folder of DICOM "
+    "slices, or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
 )
 _STEPS = "; several are time steps, step_2 before step_10, and so are those of a store"
 #: What is read, by names for it: of which some may be a volume that is known by its name.

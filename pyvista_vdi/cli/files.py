@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from contextlib import closing
 from dataclasses import asdict
 from typing import Any
 
@@ -89,8 +90,8 @@ def convert(options: argparse.Namespace) -> int:
     from pyvista_vdi.io import checked_target
     from pyvista_vdi.io.files import format_named, holds
     from pyvista_vdi.model.camera import Camera
+    from pyvista_vdi.plotting.progress import DelayedBar
 
-    inputs.require_vdi(options.file, "convert")
     arguments, foreign = inputs.file_options(options), {}
     target, of_several = format_named(options.output), holds(options.file) in ("series", "set")
     if not of_several:
@@ -99,8 +100,8 @@ def convert(options: argparse.Namespace) -> int:
         foreign["camera"] = inputs.from_json(options.camera_json, Camera.from_dict, "camera")
     if options.thickness is not None:
         foreign["thickness"] = options.thickness
-    with inputs.measuring("converting") as bar:
-        found: Any = read(options.file, progress=inputs.part(bar, 0.0, 0.5, "reading"), **foreign)
+    with closing(DelayedBar(label="converting")) as bar:
+        found: Any = read(options.file, progress=bar, **foreign)
         page = getattr(target, "page", False)
         keeps = page or getattr(target, "values", False) or of_several
         look = inputs.look_for(options, found, options.file, colors=not keeps)
@@ -108,7 +109,6 @@ def convert(options: argparse.Namespace) -> int:
             arguments |= look  # that the page begins with
         elif look:
             found = found.classified(**look)
-        writing = inputs.part(bar, 0.5, 1.0, "writing")
-        found.save(options.output, progress=writing, **arguments)
+        found.save(options.output, progress=bar, **arguments)
     say_vdi(options, found)
     return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 from pyvista_vdi.api import generate as generate_vdi
@@ -14,7 +15,6 @@ from pyvista_vdi.cli.inputs import (
     classification,
     file_options,
     given,
-    measuring,
     read_volume,
 )
 from pyvista_vdi.cli.text import mebibytes, printable
@@ -26,6 +26,7 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
 from pyvista_vdi.model.standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
 from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.plotting.progress import DelayedBar
 from pyvista_vdi.quality.targets import describe
 
 
@@ -44,11 +45,11 @@ def generate(options: argparse.Namespace) -> int:
         print(volume.describe(), file=sys.stderr)
     start = time.perf_counter()
     how |= {"client": options.scheduler, "device": options.device, **look}
-    with measuring("generating a VDI") as bar:
+    with closing(DelayedBar()) as bar:
         vdi = generate_vdi(volume, view, options.size, progress=bar, **how)
     seconds = time.perf_counter() - start
     file_arguments.pop("precision", None)  # which it has
-    with measuring("writing it") as bar:
+    with closing(DelayedBar(label="writing it")) as bar:
         vdi.save(path, progress=bar, **file_arguments)
     say_vdi(options, vdi, f", {seconds:.1f} s")
     if (chosen := describe(vdi.metadata)) is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -16,7 +15,6 @@ from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file, sto
 from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.volumes.in_file import placed
-from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
@@ -26,7 +24,6 @@ from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.plotting.progress import DelayedBar
 
 _T = TypeVar("_T")
 
@@ -47,10 +44,6 @@ def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dic
     """
     values = {name: getattr(options, name, None) for name in declared(*records)}
     found = {name: value for name, value in values.items() if value is not None}
-    of: Any = {n: getattr(options, f"occlusion_{n}", None) for n in ("radius", "strength")}
-    of = {name: value for name, value in of.items() if value is not None}
-    if "ambient_occlusion" in values and (of or "ambient_occlusion" in found):
-        found["ambient_occlusion"] = AmbientOcclusion(**of)
     seldom = {name: found.pop(name) for name in Settings.declared if name in found and not flat}
     return found | ({"settings": Settings(**seldom)} if seldom else {})
 
@@ -128,18 +121,6 @@ def is_volume(options: argparse.Namespace) -> bool:
     return False
 
 
-def require_vdi(file: str, name: str) -> None:
-    """Refuse a volume where a VDI is wanted, and say how the command makes one."""
-    shown = printable(file)
-    if not (is_vdi_file(file) or is_store(file) or os.path.exists(file)):  # noqa: PTH110 - too long
-        raise VDIFileError(f"{shown} does not exist: check the file's name")
-    if not is_vdi_file(file) and holds(file) not in ("series", "set"):
-        raise UnsupportedError(
-            f"{shown} is no VDI, which is what {name} takes; of a volume, 'pyvista-vdi generate "
-            f"{shown} -o FILE.vdi' makes one"
-        )
-
-
 def volume_name(options: argparse.Namespace) -> str:
     """Return a short name of the volume, for files and reports."""
     if options.example is not None:
@@ -168,22 +149,6 @@ def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterato
             with suppress(OSError):  # something is there
                 folder.rmdir()
         raise
-
-
-@contextmanager
-def measuring(label: str) -> Iterator[DelayedBar]:
-    """Show how far the work is."""
-    bar = DelayedBar(label=label)
-    try:
-        yield bar
-    finally:
-        bar.close()
-
-
-def part(bar: DelayedBar, first: float, last: float, doing: str) -> Callable[[float], None]:
-    """Return what shows a part of the work on its part of a bar."""
-    bar(first, doing)
-    return lambda fraction: bar(first + fraction * (last - first), doing)
 
 
 def say_written(files: Iterable[Path | str]) -> None:

@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import asdict
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 from pyvista_vdi.cli.inputs import (
     classification,
-    measuring,
     output_files,
     read_volume,
     say_written,
@@ -26,8 +25,8 @@ from pyvista_vdi.measure.bench import as_json
 from pyvista_vdi.measure.compare import contact_sheet, measure, table
 from pyvista_vdi.measure.tradeoff import AXES, COSTS, DEFAULT_AXES, measure_tradeoff, sweep
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.plotting.progress import DelayedBar
 
 #: Frames and views of ``tradeoff``, without and with ``--quick``.
 _SIZES = ((640, 360), (320, 180))
@@ -40,13 +39,12 @@ def compare(options: argparse.Namespace) -> int:
         options.tf = "soft"
     look = classification(options)
     Classification.composited(look, "compare")  # refused before anything is read or written
-    standard = TRANSFER_FUNCTIONS[options.tf] if options.tf else {"": None}
-    named = options.tf if all(look.get(n, 0) == v for n, v in standard.items()) else "custom"
-    stem = f"{volume_name(options)}-{named}"
+    stem = f"{volume_name(options)}-{options.tf or 'custom'}"
     volume = read_volume(options)
     names = ("angles", "max_supersegments", "precision", "sample_distance", "repeats", "device")
     how = {n: getattr(options, n) for n in names if getattr(options, n) is not None}
-    with output_files(options, stem, "vdi", "png", "json") as files, measuring("comparing") as bar:
+    bar = DelayedBar(label="comparing")
+    with output_files(options, stem, "vdi", "png", "json") as files, closing(bar):
         how |= {"vtk": not options.no_vtk, "name": stem, "progress": bar}
         report, vdi, images = measure(volume, look, options.size, **how)
     vdi.save(files["vdi"], compression=options.compression)
@@ -59,14 +57,14 @@ def compare(options: argparse.Namespace) -> int:
 
 
 def tradeoff(options: argparse.Namespace) -> int:
-    """Measure what each setting costs and gives, and write JSON, tables and a plot."""
+    """Measure what each setting costs and gives, and write JSON and tables."""
     look = classification(options)
     Classification.composited(look, "tradeoff")  # refused before the volume is read
     # With --quick the last of an axis's usual values
     quick = bool(options.quick)
     usual = {n: values[-1:] if quick else values for n, values in AXES.items()}
     axes = dict(_axis(text, usual) for text in options.sweep or DEFAULT_AXES)
-    settings = sweep(axes, pairs=not quick)
+    settings = sweep(axes)
     name, volume = volume_name(options), read_volume(options)
     if not set(look) - {"interpolation"} and not volume.rgba:
         # A ramp from transparent black to opaque white, which needs no PyVista
@@ -81,8 +79,8 @@ def tradeoff(options: argparse.Namespace) -> int:
         "vtk": not options.no_vtk,
         "name": name,
     }
-    kinds = ("json", "md", "png")
-    with output_files(options, f"tradeoff-{name}", *kinds) as files, measuring("tradeoff") as bar:
+    bar = DelayedBar(label="tradeoff")
+    with output_files(options, f"tradeoff-{name}", "json", "md", "png") as files, closing(bar):
         found = measure_tradeoff(volume, settings, progress=bar, **how, **look)
     for kind in COSTS:
         print(f"{kind} against SSIM: {'; '.join(found.front(kind))}")
@@ -90,10 +88,7 @@ def tradeoff(options: argparse.Namespace) -> int:
         print(f"dominated: {worse} (by {better[0]})")
     write_text(files["json"], json.dumps(as_json(asdict(found)), indent=1) + "\n")
     write_text(files["md"], found.table())
-    if find_spec("matplotlib") is None or not found.points:
-        del files["png"]
-    else:
-        found.save_plot(files["png"])
+    found.save_plot(files["png"])
     say_written(files.values())
     return 0
 

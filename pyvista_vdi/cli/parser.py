@@ -40,9 +40,7 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
         listed = "\n".join(f"    {verb.name:<11}{verb.summary}" for verb in known.values())
         print("usage: pyvista-vdi [--version] SUBCOMMAND ...\n")
         print(f"Volumetric Depth Images: generate, render, view and compare them.\n\n{listed}\n")
-        print("Each explains itself: pyvista-vdi generate --help. A first session:\n")
-        print("    pyvista-vdi generate --example brain --tf soft -o brain.vdi")
-        print("    pyvista-vdi view brain.vdi")
+        print("Each explains itself: pyvista-vdi generate --help")
         return None
     if name == "--version":
         print(f"pyvista-vdi {__version__}")

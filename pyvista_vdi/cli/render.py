@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import warnings
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -16,11 +17,8 @@ from pyvista_vdi.cli.inputs import (
     given,
     is_volume,
     look_for,
-    measuring,
-    part,
     read_volume,
     refuse,
-    require_vdi,
 )
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
@@ -31,20 +29,18 @@ from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import picture_view
 from pyvista_vdi.model.whole_file import as_path, with_suffix
 from pyvista_vdi.plotting.imports import import_pyvista, why_no_window
+from pyvista_vdi.plotting.progress import DelayedBar
 
 
 def render(options: argparse.Namespace) -> int:
     """Render a VDI from a new view and write the picture."""
     target = check_writable(with_suffix(as_path(options.output), (".png",), "a picture"))
-    require_vdi(options.file, "render")
-    with measuring("rendering") as bar:
-        found = read(options.file, progress=part(bar, 0.0, 0.5, "reading"))
-        shown = _at(found, options)
-        how = look_for(options, shown, options.file)
-        how |= {"device": options.device, **given(options, RenderOptions)}
-        bar(0.5, "drawing")
-        own, size = picture_view(shown)
-        image = render_vdi(shown, camera(options, own), options.size or size, **how)
+    with closing(DelayedBar(label="reading")) as bar:
+        shown = _at(read(options.file, progress=bar), options)
+    how = look_for(options, shown, options.file)
+    how |= {"device": options.device, **given(options, RenderOptions)}
+    own, size = picture_view(shown)
+    image = render_vdi(shown, camera(options, own), options.size or size, **how)
     write_png(to_bytes(image, options.background), target)
     print(f"{printable(options.output)}: {image.shape[1]} x {image.shape[0]}")
     return 0
@@ -79,8 +75,6 @@ def view(options: argparse.Namespace) -> int:
         actor = plotter.add_vdi(shown, **how)
         aim(plotter.camera, first)
         plotter.renderer.reset_camera_clipping_range()
-        if options.status:
-            actor.show_status(plotter)
         if options.time is not None:
             actor.time = options.time
         if target is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -10,7 +11,6 @@ from typing import Any
 
 from pyvista_vdi.cli.inputs import open_store, read_volume
 from pyvista_vdi.io.stores import is_store
-from pyvista_vdi.io.volumes.formats import natural_key
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,9 @@ class Step:
 def in_order(files: Sequence[str]) -> list[str]:
     """Return files in natural order where they are in a shell's."""
     case = next((c for c in (str, str.casefold) if [*files] == sorted(files, key=c)), None)
-    return [*files] if case is None else sorted(files, key=lambda name: natural_key(case(name)))
+    if case is None:
+        return [*files]
+    return sorted(files, key=lambda name: re.sub(r"\d+", lambda n: n[0].zfill(24), case(name)))
 
 
 def steps_of_volumes(

@@ -9,7 +9,7 @@ DEVICES = "json"
 GENERATE = """
 VOLUME output size=1280x720
 camera: the view that the volume fills, 20 degrees above its middle
-table: deferral: occlusion:
+table: ambient_occlusion deferral:
 [limits]
 max_supersegments criterion sample_distance tolerance view_cone memory_limit
 [quality] Lists and precision are chosen by a measurement; --size is that of pictures.
@@ -40,7 +40,6 @@ time
 target_fps  RATE  kept by fewer pixels; 0: every frame is full (default: 30)
 regenerate  {auto,never}      make another VDI where it does not serve the view
 draw        {auto,vdi,volume}  what is raycast where the volume is at hand
-status      -     show in a corner how it is drawn: pixels, frames per second, angle
 look:
 """
 
@@ -60,7 +59,7 @@ angles         A,B,...   from the generating view (default: 5,30,60; quick: 5,30
 repeats=5      COUNT     timed frames
 generations=3  COUNT     timed generations of each VDI
 sweep  AXIS[=A,B,...] ...  settings, with other values than usual: max-supersegments, \
-tolerance, lists, precision, skip-empty, preview, criterion, view-cone, sample-distance
+tolerance, lists, precision, criterion, view-cone, sample-distance
 table:
 """
 

@@ -1,7 +1,7 @@
 """Volume to a VDI that keeps values, by the same marches: a transfer function that keeps them."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, warn_external
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.checks import as_range
-from pyvista_vdi.model.deferred import DeferredVDI, importance_points
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import (
     Deferral,
     GenerationOptions,
@@ -26,7 +26,7 @@ from pyvista_vdi.model.volume import Volume
 _PER_VOXEL = 2.0**-36
 #: Table cells over the range of values. Values beyond it by less than one fade out.
 _CELLS = 4096
-#: What values and their squares weigh in the error of merging beside the importance: nothing that
+#: What values and their squares weigh in the error of merging beside the share: nothing that
 #: counts where that tells values apart.
 _BESIDE = 2.0**-8
 #: What the low end of the range counts by default beside all above it, so that air, which piles up
@@ -75,11 +75,11 @@ def generate_deferred(
     what :func:`kept_range` and ``generate`` do.
     """
     volume, options = request.volume, request.options
-    (low, high), points = kept_range(volume, options, deferral)
+    low, high = kept_range(volume, options, deferral)
     given = {each.name: getattr(options, each.name) for each in fields(options)}
     made = generate(
         request.replace(
-            transfer_function=_keeping(request, (low, high), points),
+            transfer_function=_keeping(request, (low, high)),
             options=_LengthOptions(**{**given, "precision": "exact"}),
         )
     )
@@ -110,18 +110,16 @@ def generate_deferred(
         "value_range": (low, high),
         "unit_distance": volume.default_unit_distance,
         "sample_distance": metadata["sample_distance"],
-        "importance": points,
     }
     return DeferredVDI(lists, about).with_precision(options.precision)
 
 
 def kept_range(
     volume: Volume, options: GenerationOptions, deferral: Deferral
-) -> tuple[tuple[float, float], Any]:
-    """Return the range of values that is kept, and the points of their importance.
+) -> tuple[float, float]:
+    """Return the range of values that is kept.
 
-    InvalidArgumentError if the range or the importance cannot be used, UnsupportedError for what
-    cannot be deferred.
+    InvalidArgumentError if it cannot be used, UnsupportedError for what cannot be deferred.
     """
     if volume.rgba:
         raise UnsupportedError(
@@ -144,7 +142,7 @@ def kept_range(
                 else ""
             )
         )
-    return (low, high), importance_points(deferral.importance, (low, high))
+    return low, high
 
 
 def warn_of_range(kept: DeferredVDI, volume: Volume) -> None:
@@ -174,33 +172,20 @@ def warn_of_range(kept: DeferredVDI, volume: Volume) -> None:
         )
 
 
-def _keeping(
-    request: GenerationRequest,
-    value_range: tuple[float, float],
-    points: Sequence[tuple[float, float]] | None,
-) -> TransferFunction:
+def _keeping(request: GenerationRequest, value_range: tuple[float, float]) -> TransferFunction:
     """Return the transfer function whose colours are values: its opacity is that of lengths.
 
-    Entries: one below the range and one above, which are transparent, and between them the
-    integral of the importance, the value, and its square about the middle.
+    Entries: one below the range and one above, which are transparent, and between them the share
+    of the range below the value, the value, and its square about the middle.
     """
     low, high = value_range
     place = np.arange(-1, _CELLS + 2) / _CELLS
     share = np.clip(place, 0, 1)
-    weights = np.ones_like(share)
-    if points is not None:
-        values, given = np.transpose(points)
-        weights = np.interp(low + (high - low) * share, values, given)
     integral = np.zeros_like(share)
-    np.cumsum(np.diff(share) * (weights[1:] + weights[:-1]) / 2, out=integral[1:])
-    if points is None:
-        integral[place > 0] += _LOW_END
-    if not integral[-1] > 0:
-        raise InvalidArgumentError(
-            f"importance is 0 over all of value_range {low:g} to {high:g}: nothing would be kept"
-        )
+    np.cumsum(np.diff(share), out=integral[1:])
+    integral[place > 0] += _LOW_END
     columns = (integral / integral[-1], _BESIDE * share, _BESIDE * 4 * (share - 0.5) ** 2)
-    kept = (place >= 0) & (place <= 1) & (weights > 0)
+    kept = (place >= 0) & (place <= 1)
     cell = (high - low) / _CELLS
     return TransferFunction(
         np.clip(np.stack(columns, axis=1), 0, 1),

@@ -7,7 +7,6 @@ such as ambient occlusion" (section 2). Computed is docs/dev/conventions.md, "Am
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -15,18 +14,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.checks import as_number, as_whole
+from pyvista_vdi.model.checks import Number
 from pyvista_vdi.model.volume import Geometry
 
 #: Radius by default, as a share of the bounds' diagonal.
 DEFAULT_RADIUS = 0.05
-#: Directions that may be asked for.
-DIRECTIONS = (12, 4096)
 
 #: Steps that a radius is cut into at least.
 _LEAST_STEPS = 8
 #: Cells along an axis that are not made coarser, however large the radius is.
 _LEAST_CELLS = 32
+
+
+_CHECKS = {
+    "radius": Number(
+        "a positive length in model units",
+        open_ended=True,
+        name="the radius of ambient occlusion",
+        none=True,
+    ),
+    "strength": Number("from 0 to 1", 0, 1, name="the strength of ambient occlusion"),
+    "directions": Number(
+        "a whole number from 12 to 4096",
+        12,
+        4096,
+        whole=True,
+        name="the directions of ambient occlusion",
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -64,27 +79,8 @@ class AmbientOcclusion:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        radius, strength = as_number(self.radius), as_number(self.strength)
-        if self.radius is not None:
-            if not 0 < radius < math.inf:
-                raise InvalidArgumentError(
-                    "the radius of ambient occlusion must be a positive length in model units; "
-                    f"got {self.radius!r}"
-                )
-            put(self, "radius", radius)
-        if not 0 <= strength <= 1:
-            raise InvalidArgumentError(
-                f"the strength of ambient occlusion must be from 0 to 1; got {self.strength!r}"
-            )
-        put(self, "strength", strength)
-        least, most = DIRECTIONS
-        directions = as_whole(self.directions)
-        if not least <= directions <= most:
-            raise InvalidArgumentError(
-                f"ambient occlusion takes a whole number of directions from {least} to {most}; "
-                f"got {self.directions!r}"
-            )
-        put(self, "directions", int(directions))
+        for name, check in _CHECKS.items():
+            put(self, name, check(getattr(self, name)))
 
     @classmethod
     def from_any(cls, value: Any) -> AmbientOcclusion | None:
@@ -153,18 +149,6 @@ class OcclusionGrid:
             radius / steps,
             directions[:, None, :] * along[None, :, None],
         )
-
-    def nodes_around(
-        self, lower: Sequence[float], upper: Sequence[float]
-    ) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
-        """Return the first node, and nodes, along x, y and z, whose boxes meet part of the volume.
-
-        ``lower``, ``upper``: index positions between which it lies.
-        """
-        cell = np.array(self.cell)
-        first = np.clip(np.ceil(np.array(lower) / cell - 0.5), 0, None)
-        last = np.clip(np.floor(np.array(upper) / cell + 0.5), None, np.array(self.nodes) - 1)
-        return _triple(first.astype(int)), _triple((last - first).astype(int) + 1)
 
     @property
     def margin(self) -> tuple[int, int, int]:

@@ -28,7 +28,7 @@ from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 #: What has gone, and what is done in its place.
 _GONE = {
     "skip_empty": "what is empty is passed by, without being asked",
-    "status": "call show_status(plotter) of the actor",
+    "status": "print the status of the actor (actor.status)",
     "resample": "make a uniform grid by PyVista, pyvista.ImageData(...).sample(grid)",
     "mask": "make the opacity of what is left out 0, or set its points' ghosts (vtkGhostType) to 2",
 }
@@ -38,19 +38,15 @@ def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) ->
     """Raise TypeError for the first argument whose name is not known, and say what is meant."""
     known = [name for name in known if name != "self"]
     options = declared(*RECORDS)
-    meant = {alias: name for name, told in options.items() for alias in told.aliases}
     for name in given:
         if name in known:
             continue
-        own = meant.get(name, name)
-        elsewhere = (each.elsewhere for each in RECORDS if own in vars(each)["declared"])
+        elsewhere = (each.elsewhere for each in RECORDS if name in vars(each)["declared"])
         near = difflib.get_close_matches(name, known, n=1)
-        suggestion = own if own in known else near[0] if near else None
-        hint = f"did you mean {suggestion!r}?" if suggestion else f"known are {', '.join(known)}"
-        if own not in known:
-            hint = _GONE.get(name) or next(filter(None, elsewhere), "") or hint
-            if "settings" in known and own in options and options[own].setting:
-                hint = f"pass it by settings=pyvista_vdi.Settings({own}=...)"
+        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
+        hint = _GONE.get(name) or next(filter(None, elsewhere), hint)
+        if "settings" in known and name in options and options[name].setting:
+            hint = f"pass it by settings=pyvista_vdi.Settings({name}=...)"
         raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")
 
 

@@ -106,7 +106,7 @@ class ArrayChoice(Described):
             raise UnsupportedError(
                 f"blending={self.blending!r} is not supported: a VDI stores what is composited "
                 "along a ray; pass blending='composite', or draw the volume itself by "
-                "Plotter.add_volume or pyvista_vdi.render_volume"
+                "Plotter.add_volume"
             )
 
 
@@ -125,7 +125,8 @@ class Look(Described):
     )
 
     clim: RangeLike | None = option(
-        None, "range of the colour map; that of all values by default", aliases=("rng",)
+        None,
+        "range of the colour map; that of all values by default",
     )
     n_colors: int = option(
         256,
@@ -140,7 +141,8 @@ class Look(Described):
         "shorter one is 0 to 1 and interpolated.",
     )
     cmap: ColorMapLike | None = option(
-        None, "colour map; the theme's by default", aliases=("colormap",)
+        None,
+        "colour map; the theme's by default",
     )
     flip_scalars: bool = option(False, "reverse the colour map")
     opacity_unit_distance: float | None = option(
@@ -148,7 +150,6 @@ class Look(Described):
         "length over which opacities are reached, model units; the volume's diagonal over its mean "
         "number of cells by default",
         check=Number("a positive length in model units", open_ended=True),
-        aliases=("unit_distance",),
     )
     log_scale: bool = option(False, "map values to colours by their logarithm")
     shade: bool = option(
@@ -164,7 +165,6 @@ class Look(Described):
     interpolation: Interpolation = option(
         "nearest",
         'between voxels; ``add_volume`` draws ``"nearest"``',
-        aliases=("interpolation_type",),
     )
 
 
@@ -178,7 +178,8 @@ class Classification(Look, ArrayChoice):
     """
 
     volume_property: VTKObject | None = option(
-        None, "in place of the others, as it is", aliases=("property", "prop")
+        None,
+        "in place of the others, as it is",
     )
     transfer_function: TransferFunction | None = option(
         None, "in place of the others; it needs no PyVista"

@@ -167,21 +167,19 @@ def _warn_outside(deferred: DeferredVDI, transfer_function: TransferFunction) ->
         return
     low, high = deferred.value_range
     # Sample at the function's nodes, too, which may span a small part of the volume's range
-    nodes = np.linspace(*transfer_function.scalar_range, len(transfer_function.opacities))
+    first, last = transfer_function.scalar_range
+    nodes = np.linspace(first, last, len(transfer_function.opacities))
     places = np.concatenate([np.linspace(least, largest, 4097), nodes.clip(least, largest)])
     values = np.unique(places)
     if len(values) < 2:
         return
     opacity = looked_up(transfer_function, values)[1] * np.gradient(values)
     kept = (values >= low) & (values <= high)
-    if deferred.importance is not None:
-        points, weights = np.transpose(deferred.importance)
-        kept &= np.interp(values, points, weights) > 0
     outside = opacity[~kept].sum()
     if outside > 1e-3 * opacity.sum():
         warn_external(
-            f"the transfer function shows values outside {low:g} to {high:g}, or of importance 0, "
-            f"which this VDI does not keep: {outside / opacity.sum():.1%} of its opacity from "
+            f"the transfer function shows values outside {low:g} to {high:g}, which this "
+            f"VDI does not keep: {outside / opacity.sum():.1%} of its opacity from "
             f"{least:g} to {largest:g}; generate with a wider value_range, or lower the opacity "
             "there"
         )

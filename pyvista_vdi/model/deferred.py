@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
-from pyvista_vdi.model.checks import as_floats, as_number, as_range
+from pyvista_vdi.errors import InvalidVDIError
+from pyvista_vdi.model.checks import as_number, as_range
 from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI, Lists, lengths_of, with_arrays
 
@@ -40,8 +40,7 @@ class DeferredVDI(Lists):
         ``value_range``, the least and the largest value that it keeps; ``unit_distance``, the
         opacity unit distance of a transfer function that has none of its own, and
         ``sample_distance``, the step of the march that made it, by whose opacity values are
-        averaged, model units; ``importance``, points (value, weight) by which supersegments were
-        cut, 1 everywhere by default; ``version``, 1.
+        averaged, model units; ``version``, 1.
 
     Raises
     ------
@@ -52,7 +51,6 @@ class DeferredVDI(Lists):
     value_range: tuple[float, float]
     unit_distance: float
     sample_distance: float
-    importance: tuple[tuple[float, float], ...] | None
 
     def __init__(self, lists: VDI, about: Mapping[str, Any]) -> None:
         version = about.get("version") if isinstance(about, Mapping) else about
@@ -77,10 +75,6 @@ class DeferredVDI(Lists):
             if not 0 < length < np.inf:
                 raise InvalidVDIError(f"{name} must be a length above 0; got {about.get(name)!r}")
             setattr(self, name, length)
-        try:
-            self.importance = importance_points(about.get("importance"), self.value_range)
-        except InvalidArgumentError as error:
-            raise InvalidVDIError(str(error)) from error
         for name in ("camera", "window_size", "bounds", "depth_origin", "metadata"):
             setattr(self, name, getattr(lists, name))
         self._lists = lists
@@ -94,13 +88,12 @@ class DeferredVDI(Lists):
     @property
     def about(self) -> dict[str, Any]:
         """What is stored beside :attr:`lists`, in values that JSON can hold."""
-        points = self.importance
         return {
             "version": 1,
             "value_range": list(self.value_range),
             "unit_distance": self.unit_distance,
             "sample_distance": self.sample_distance,
-            "importance": None if points is None else [list(point) for point in points],
+            "importance": None,  # older files say which values counted most when lists were cut
         }
 
     @cached_property
@@ -211,31 +204,3 @@ class DeferredVDI(Lists):
     def __repr__(self) -> str:
         low, high = self.value_range
         return repr(self._lists).replace("VDI(", "DeferredVDI(")[:-1] + f", {low:g} to {high:g})"
-
-
-def importance_points(
-    importance: Any, value_range: tuple[float, float]
-) -> tuple[tuple[float, float], ...] | None:
-    """Return an importance as points (value, weight); ``None``: 1 everywhere.
-
-    Points are given as such, with values that grow, or as weights alone, at equal distances over
-    the range, as an opacity curve is. InvalidArgumentError if it is neither.
-    """
-    if importance is None:
-        return None
-    points = as_floats(importance)
-    if points.ndim == 1 and len(points) > 1:
-        points = np.stack([np.linspace(*value_range, len(points)), points], axis=1)
-    if (
-        points.ndim != 2
-        or points.shape[1] != 2
-        or len(points) < 2
-        or not np.isfinite(points).all()
-        or not (np.diff(points[:, 0]) >= 0).all()
-        or not (points[:, 1] >= 0).all()
-    ):
-        raise InvalidArgumentError(
-            "importance must be two or more weights >= 0, or points (value, weight) with values "
-            f"that grow; got {importance!r}"
-        )
-    return tuple((float(value), float(weight)) for value, weight in points)

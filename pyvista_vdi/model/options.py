@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, partial
 from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin
@@ -74,8 +74,8 @@ class Option:
     documentation has behind it. ``kind`` is the type of the argument, as it is written in Python.
     ``check`` returns a value as it is kept, or raises InvalidArgumentError; without one a value is
     one of the choices, a truth value where the default is one, and else whatever is given.
-    ``choices`` are the texts that are taken, where these are all; ``aliases`` other names by which
-    users may call it; a ``setting`` is seldom turned, and stands in :class:`Settings`;
+    ``choices`` are the texts that are taken, where these are all; a ``setting`` is seldom turned,
+    and stands in :class:`Settings`;
     ``standard`` is the default as it is kept.
     """
 
@@ -86,7 +86,6 @@ class Option:
     kind: str = "Any"
     check: Callable[[Any], Any] | None = None
     choices: tuple[str, ...] = ()
-    aliases: tuple[str, ...] = ()
     setting: bool = False
     standard: Any = None
 
@@ -118,7 +117,7 @@ _WORDS = {
     "MemoryLike": "int, float or str",
     "OcclusionLike": "bool, float or AmbientOcclusion",
     "OpacityLike": "str or float or array_like",
-    "Policy": '{"auto", "never"} or callable',
+    "Policy": '{"auto", "never"}',
     "RangeLike": "float or (float, float)",
     "ScalarsLike": "str or numpy.ndarray",
     "VolumeLike": "pyvista.DataSet, Volume, path",
@@ -133,11 +132,10 @@ def option(
     *,
     check: Callable[[Any], Any] | None = None,
     takes: str = "",
-    aliases: Sequence[str] = (),
     setting: bool = False,
 ) -> Any:
     """Declare an option as a field of a record; it ``takes`` a type, by default the field's."""
-    told = Option("", default, what, more, takes, check, (), tuple(aliases), setting)
+    told = Option("", default, what, more, takes, check, (), setting)
     return field(default=default, metadata={"option": told})
 
 
@@ -225,7 +223,7 @@ class MediumOptions(Options):
     sample_distance: float | None = option(
         None,
         "length of a step along a ray, model units; half the smallest spacing by default",
-        aliases=("step",),
+        check=Number("a positive length in model units", open_ended=True),
         setting=True,
     )
     lights: Lights = option(
@@ -273,7 +271,6 @@ class GenerationOptions(MediumOptions):
         check=Number(
             f"a whole number from 1 to {MAX_SUPERSEGMENTS}", 1, MAX_SUPERSEGMENTS, whole=True
         ),
-        aliases=("n_supersegments",),
     )
     criterion: Criterion = option(
         "least-error",
@@ -336,22 +333,14 @@ class Deferral(Options):
         "All by default. What is outside is empty.",
         takes="RangeLike | None",
     )
-    importance: Any = option(
-        None,
-        "how much errors count over the range, where deferred",
-        "Points (scalar, weight), or weights at equal distances; 1 by default, and 0 is empty.",
-        takes="ArrayLike | None",
-        setting=True,
-    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("value_range", "importance"):
-            if getattr(self, name) is not None and self.classification != "deferred":
-                raise InvalidArgumentError(
-                    f"{name}={getattr(self, name)!r} says what is kept to be classified "
-                    f"afterwards: give classification='deferred' as well, or leave {name} out"
-                )
+        if self.value_range is not None and not self.deferred:
+            raise InvalidArgumentError(
+                f"value_range={self.value_range!r} says what is kept to be classified afterwards: "
+                "give classification='deferred' as well, or leave value_range out"
+            )
         low, high = (0, 1) if self.value_range is None else as_range(self.value_range)
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise InvalidArgumentError(

@@ -158,16 +158,6 @@ def checked_rate(name: str, value: Any) -> float:
     return replace(_RATE, name=name)(value)  # type: ignore[no-any-return]
 
 
-def checked_policy(policy: Any) -> Policy:
-    """Return ``"auto"``, ``"never"`` or a callable; refuse anything else."""
-    if policy in ("auto", "never") or callable(policy):
-        return policy  # type: ignore[no-any-return]
-    raise InvalidArgumentError(
-        "regenerate must be 'auto', 'never' or a callable that takes a VDIStatus and says whether "
-        f"to regenerate; got {policy!r}"
-    )
-
-
 @record
 @dataclass(frozen=True)
 class DrawingOptions(Options):
@@ -192,11 +182,9 @@ class DrawingOptions(Options):
         "auto",
         "when a view gets a VDI of its own",
         '``"auto"``: in windows on the screen, where the estimated SSIM of its picture is below '
-        "``regenerate_below``. A callable gets ``actor.status`` once per frame and returns whether "
-        "to regenerate, off-screen too, before the frame. "
+        "``regenerate_below``. "
         '``"never"``: only ``actor.regenerate()``. Changed data and transfer functions are always '
         "made anew.",
-        check=checked_policy,
     )
     regenerate_below: float | None = option(
         None,
@@ -226,5 +214,6 @@ class DrawingOptions(Options):
 # Checks of VTK's setters of the same
 checked_bound: Any = DrawingOptions.declared["regenerate_below"].check
 checked_opacity_multiplier: Any = SceneOptions.declared["opacity_multiplier"].check
+checked_policy: Any = DrawingOptions.declared["regenerate"].check
 checked_draw: Any = DrawingOptions.declared["draw"].check
 checked_transmittance_cutoff: Any = RenderOptions.declared["transmittance_cutoff"].check

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import KW_ONLY, asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
-from pyvista_vdi.model.checks import as_float, as_range, one_of
+from pyvista_vdi.model.checks import Number, as_range, one_of
 from pyvista_vdi.model.lighting import Shading
 
 #: Optical depth that a fully opaque sample gets per step: exp(-30) is 1e-13, nothing passes.
 OPAQUE_OPTICAL_DEPTH = 30.0
 
+_UNIT = Number("a positive length in model units", open_ended=True, name="unit_distance", none=True)
+
 #: Share of a volume's scalar range beyond which VTK tells no gradient magnitudes apart.
 GRADIENT_SHARE = 0.25
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class TransferFunction:
     """Colour and opacity by scalar, piecewise linear between equidistant nodes.
 
@@ -65,67 +68,56 @@ class TransferFunction:
     table ends.
     """
 
-    gradient_opacities: NDArray[np.float32] | None
-    gradient_range: tuple[float, float] | None
+    colors: Any
+    opacities: Any
+    scalar_range: Any
+    _: KW_ONLY
+    unit_distance: float | None = None
+    interpolation: str = "nearest"
+    shading: Shading | None = None
+    gradient_opacities: Any = None
+    gradient_range: Any = None
 
-    def __init__(
-        self,
-        colors: ArrayLike,
-        opacities: ArrayLike,
-        scalar_range: tuple[float, float],
-        *,
-        unit_distance: float | None = None,
-        interpolation: str = "nearest",
-        shading: Shading | None = None,
-        gradient_opacities: ArrayLike | None = None,
-        gradient_range: tuple[float, float] | None = None,
-    ) -> None:
-        self.colors = _table("colors", colors, (3,))
-        self.opacities = _table("opacities", opacities, ())
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "colors", _table("colors", self.colors, (3,)))
+        put(self, "opacities", _table("opacities", self.opacities, ()))
         if len(self.colors) != len(self.opacities):
             raise InvalidArgumentError(
                 f"a transfer function needs as many opacities as colors; got "
                 f"{len(self.opacities)} and {len(self.colors)}"
             )
-        low, high = as_range(scalar_range)
+        low, high = as_range(self.scalar_range)
         if not (np.isfinite(low) and np.isfinite(high) and low <= high):
             raise InvalidArgumentError(
                 f"scalar_range (clim) must be two finite numbers, the smaller first; "
-                f"got {scalar_range!r}"
+                f"got {self.scalar_range!r}"
             )
-        self.scalar_range = (low, high)
-        unit = None if unit_distance is None else as_float(unit_distance)
-        if unit is not None and not (np.isfinite(unit) and unit > 0):
+        put(self, "scalar_range", (low, high))
+        put(self, "unit_distance", _UNIT(self.unit_distance))
+        one_of(self.interpolation, "interpolation", ("nearest", "linear"))
+        if not isinstance(self.shading, Shading | None):
             raise InvalidArgumentError(
-                f"unit_distance must be a positive length in model units; got {unit_distance!r}"
+                f"shading must be a pyvista_vdi.Shading; got {type(self.shading).__name__}"
             )
-        self.unit_distance = unit
-        self.interpolation = one_of(interpolation, "interpolation", ("nearest", "linear"))
-        if not isinstance(shading, Shading | None):
-            raise InvalidArgumentError(
-                f"shading must be a pyvista_vdi.Shading; got {type(shading).__name__}"
-            )
-        self.shading = shading
-        if (gradient_opacities is None) != (gradient_range is None):
+        if (self.gradient_opacities is None) != (self.gradient_range is None):
             raise InvalidArgumentError(
                 "gradient_opacities and gradient_range belong together: give both or neither"
             )
-        self.gradient_opacities = self.gradient_range = None
-        if gradient_opacities is not None and gradient_range is not None:
-            low, high = as_range(gradient_range)
+        if self.gradient_opacities is not None:
+            low, high = as_range(self.gradient_range)
             if not (np.isfinite(low) and np.isfinite(high) and 0 <= low < high):
                 raise InvalidArgumentError(
                     "gradient_range must be two magnitudes, 0 <= low < high; got "
-                    f"{gradient_range!r}"
+                    f"{self.gradient_range!r}"
                 )
-            self.gradient_opacities = _table("gradient_opacities", gradient_opacities, ())
-            self.gradient_range = (low, high)
+            factors = _table("gradient_opacities", self.gradient_opacities, ())
+            put(self, "gradient_opacities", factors)
+            put(self, "gradient_range", (low, high))
 
     def replace(self, **changes: Any) -> TransferFunction:
         """Return a copy with some arguments of the constructor changed."""
-        if unknown := sorted(set(changes) - set(vars(self))):
-            raise InvalidArgumentError(f"a TransferFunction has no {', '.join(unknown)}")
-        return TransferFunction(**{**vars(self), **changes})
+        return replace(self, **changes)
 
     def to_dict(self) -> dict[str, Any]:
         """Return what can be written to JSON: the whole table and its range."""

@@ -94,6 +94,6 @@ Draw: TypeAlias = Literal["auto", "vdi", "volume"]
 #: When scalars are classified.
 When: TypeAlias = Literal["baked", "deferred"]
 Blending: TypeAlias = Literal["composite", "maximum", "minimum", "average", "additive"]
-#: When a view gets a VDI of its own; a function gets the actor's status.
-Policy: TypeAlias = Literal["auto", "never"] | Callable[[Any], object]
+#: When a view gets a VDI of its own.
+Policy: TypeAlias = Literal["auto", "never"]
 Metadata: TypeAlias = Mapping[str, Any]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import reprlib
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_bounds, as_number, as_whole, not_taken
+from pyvista_vdi.model.checks import as_bounds, as_number, as_whole
 from pyvista_vdi.model.packing import Arrays, Packed8, check_precision, lengths_of_lists, packing_of
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ _LENS = ("view_angle", "use_horizontal_view_angle", "parallel_scale", "window_ce
 LateArrays = Any
 
 
-class Lists(ABC):
+class Lists:
     """A view, and sorted lists of disjoint supersegments along its rays."""
 
     #: The generating view V_O.
@@ -48,18 +47,15 @@ class Lists(ABC):
     metadata: dict[str, Any]
 
     @property
-    @abstractmethod
-    def lists(self) -> VDI:
-        """The lists in the form of a VDI, for storage."""
-
-    @abstractmethod
-    def with_precision(self, precision: str) -> Any:
-        """Return it with supersegments of fewer bytes."""
+    def lists(self) -> Any:
+        """The lists in the form of a VDI, for storage: of a VDI itself."""
+        return self
 
     @property
     def arrays(self) -> Arrays:
         """All arrays, in the order of :class:`VDI`'s arguments."""
-        return self.lists.arrays
+        found: Arrays = self.lists.arrays
+        return found
 
     @property
     def offsets(self) -> NDArray[np.uint64]:
@@ -196,11 +192,6 @@ class VDI(Lists):
         return self._arrays
 
     @property
-    def lists(self) -> VDI:
-        """Itself: what is stored of it."""
-        return self
-
-    @property
     def offsets(self) -> NDArray[np.uint64]:
         """Where each list begins, uint64 (W * H + 1,); the last entry is their number n."""
         known = getattr(self.late, "offsets", None)
@@ -237,10 +228,8 @@ class VDI(Lists):
     def list_at(self, x: int, y: int) -> slice:
         """Return the supersegments of pixel (x, y), y = 0 at the bottom, as a slice."""
         width, height = self.window_size
-        if math.isnan(as_whole(x)) or math.isnan(as_whole(y)):
-            raise not_taken(x)(f"x and y must be whole numbers of pixels; got {x!r} and {y!r}")
-        if not (0 <= x < width and 0 <= y < height):
-            raise IndexError(f"pixel ({x}, {y}) is outside the window of {width} x {height}")
+        if not (0 <= as_whole(x) < width and 0 <= as_whole(y) < height):
+            raise IndexError(f"there is no pixel ({x!r}, {y!r}) in {width} x {height}")
         i = y * width + x
         return slice(int(self.offsets[i]), int(self.offsets[i + 1]))
 
@@ -306,14 +295,6 @@ class VDI(Lists):
         -------
         object
             What ``Plotter.show`` returns.
-
-        Notes
-        -----
-        The picture is that of :func:`pyvista_vdi.render` to half of 1/255, its rounding, with
-        ``anti_aliasing=False``. PyVista's own setting takes eight samples of a pixel: where the
-        outline of the bounds crosses a pixel, samples beside it count as empty, as they do for
-        VTK's volumes, and the pixel gets a part of its light. In a window of 64 x 48 that was 3
-        pixels, by 3.7/255; of the same volume drawn by VTK, 21 pixels, by up to 20/255.
 
         Examples
         --------

@@ -67,8 +67,8 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
         return other
 
     def NewInstance(self) -> PlotterVDIMapper:  # noqa: N802
-        """Return another mapper of the same theme, with nothing to draw yet."""
-        return PlotterVDIMapper(theme=self._theme)
+        """Return another mapper, with nothing to draw yet."""
+        return PlotterVDIMapper()
 
     def ShallowCopy(self, other: Any) -> None:  # noqa: N802
         """Draw what another mapper of this class draws, in the same way, with its lookup table."""
@@ -95,35 +95,6 @@ class PlotterVDIActor(VDIActorMethods, Volume):
         if vdi is None:
             return f"PlotterVDIActor(a volume, of which actor.vdi makes a VDI{hidden})"
         return f"PlotterVDIActor({vdi!r}{hidden})"
-
-    def SetProperty(self, prop: Any) -> None:  # noqa: N802
-        """Set the volume property, from which the VDI is regenerated.
-
-        What is shared with a copy of this actor is not changed for the other.
-
-        Parameters
-        ----------
-        prop : vtkVolumeProperty
-            Changes to it are followed.
-
-        Raises
-        ------
-        UnsupportedError, InvalidArgumentError
-            If a VDI cannot honour it; the property before stays.
-        """
-        mapper = self.GetMapper()
-        source = None if mapper is None else mapper.GetSource()
-        if source is not None and prop is not source.GetVolumeProperty():
-            shown = mapper.driver.input
-            mine = shown if shown.alone else shown.separate()
-            mine.source.SetVolumeProperty(prop)
-            if mine is not shown:
-                mapper.driver.set_input(mine)
-        elif mapper is not None and (shown := mapper.driver.input) is not None:
-            mine = shown.classified_by(prop)
-            if mine is not shown:
-                mapper.SetInputData(mine)
-        super().SetProperty(prop)
 
     def camera_to_come(self, renderer: Any) -> Any:
         """Return the camera of a renderer's next picture."""

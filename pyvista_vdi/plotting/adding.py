@@ -101,7 +101,7 @@ class Placement(Options):
 
 @record
 @dataclass(frozen=True, eq=False)
-class Making(Options):
+class InputOptions(Options):
     """What a VDI is made of, from where, and by what."""
 
     resolution: Sequence[float] | None = option(None, "spacing of a NumPy array; 1 by default")
@@ -129,7 +129,7 @@ class Addition:
     array: ArrayChoice
     look: Looks
     place: Placement
-    making: Making
+    making: InputOptions
     options: GenerationOptions
     target: QualityTarget
     deferral: Deferral
@@ -323,10 +323,10 @@ def _of_late_values(volume: Any, asked: Addition) -> _Shown:
             "classification"
         )
     source = _source(volume, asked)
-    source.SetDeferral("deferred", asked.deferral.value_range, asked.deferral.importance)
+    source.SetDeferral("deferred", asked.deferral.value_range)
     source.SetVolumeProperty(pv.VolumeProperty(interpolation_type=asked.look.interpolation))
     volume = source.GetVolume()
-    ends, _ = kept_range(volume, asked.options, asked.deferral)
+    ends = kept_range(volume, asked.options, asked.deferral)
     plain = replace(asked, look=replace(asked.look, interpolation="nearest"))
     return _values_shown(source, plain, ends, volume.default_unit_distance, volume.name)
 

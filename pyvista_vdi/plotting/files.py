@@ -24,7 +24,6 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_to_image,
     volume_from_vtk,
 )
-from pyvista_vdi.vtk_pipeline.filters.temporal import only_grid
 
 
 def read_vdi(path: str, **options: Any) -> pv.ImageData:
@@ -98,7 +97,12 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
     if "error" in (written := window.GetOutput()).lower():  # of what is no error it warns, too
         said = written.partition("\n")[2].partition("\n\n")[0].split("): ", 1)[-1]
         raise InvalidVolumeError(f"{file} cannot be read ({' '.join(said.split())}): write it anew")
-    data, _ = as_grid(pv.wrap(only_grid(held)), None, None)
+    grid = pv.wrap(held)
+    if isinstance(grid, pv.MultiBlock):  # of several blocks it is the only uniform one, or the only
+        blocks = [*grid.recursive_iterator(skip_none=True)]
+        found = [block for block in blocks if isinstance(block, pv.ImageData)] or blocks
+        grid = found[0] if len(found) == 1 else grid
+    data, _ = as_grid(grid, None, None)
     if is_vdi_image(data):
         raise InvalidVolumeError(
             f"{file} is a VDI in its VTK form, not a volume: "

@@ -144,8 +144,7 @@ class Seen:
     chosen: bool = False  # whether somebody has chosen that one: before the first VDI, and since
     # What the user asks for
     draw: Literal["auto", "vdi", "volume"] = "auto"
-    regenerate: Literal["auto", "never", "ask"] = "auto"  # "ask": a function of the user's
-    wish: bool = False  # what that says of this view
+    regenerate: Literal["auto", "never"] = "auto"
     bound: float | None = None  # least SSIM that does
     # Who looks
     watched: bool = False  # whether somebody watches, so that frames wait for nothing
@@ -220,7 +219,7 @@ def _watched(seen: Seen) -> Plan:
     serves = making is not None and not (
         _other(seen, making.content) or (not seen.hand and _left(seen, making))
     )
-    asked_for = asked or seen.regenerate == "ask" or (seen.chosen and made is not None)
+    asked_for = asked or (seen.chosen and made is not None)
     make = None
     if not (seen.hand or serves or seen.failed) and (
         asked_for or seen.late or seen.volume != "whole"
@@ -241,7 +240,7 @@ def _watched(seen: Seen) -> Plan:
         way: RenderMode = "volume"
         if made.coverage == 1 and (seen.moving or made.magnification <= FINE_ENOUGH):
             way = _better(seen, made)
-        costs = seen.costs.chosen(way)
+        costs = replace(seen.costs, way=way)
         return _planned(seen, way, made.content, costs=costs, **rest)
     return _planned(seen, "vdi", **rest)
 
@@ -253,12 +252,9 @@ def _kept(seen: Seen) -> Plan:
     that the picture is like the volume's.
     """
     made, again = seen.made, not seen.failed
-    if seen.draw == "vdi" or (made is None and seen.regenerate == "ask"):
-        take = made is not None and seen.wish
-        view: Any = "take" if take else None if made is None else _follow(seen)
-        return _planned(seen, "vdi", view=view, update=take or again)
-    if seen.wish:
-        return _planned(seen, "vdi", view="take", update=True)
+    if seen.draw == "vdi":
+        view = None if made is None else _follow(seen)
+        return _planned(seen, "vdi", view=view, update=again)
     if seen.content is None:
         return _planned(seen, "trouble")
     pictures = seen.pictures
@@ -317,8 +313,6 @@ def _view_to_make(seen: Seen) -> View | None:
         return own
     if seen.stale:
         return own if seen.regenerate == "never" else seen.view
-    if seen.regenerate == "ask":
-        return seen.view if seen.wish else None
     estimate, bound = seen.estimate, seen.bound
     if seen.regenerate == "never" or estimate is None or _unknown(seen) or _at_home(seen, made):
         return None

@@ -48,7 +48,7 @@ def test_absent_without_the_variable(monkeypatch, tmp_path):
     with pytest.raises(InvalidArgumentError, match=r"'brian'.*aneurism.*brain"):
         examples.load_data("brian")
     monkeypatch.delenv(examples.DATA_VARIABLE, raising=False)
-    with pytest.raises(DataNotFoundError, match=r"PYVISTA_VDI_DATA is not set.*aneurism_256_u8"):
+    with pytest.raises(DataNotFoundError, match=r"PYVISTA_VDI_DATA names, None, .*aneurism_256_u8"):
         examples.load_data("aneurism")
     assert examples.available() == tuple(SHIPPED)
     # Nor is the current folder searched

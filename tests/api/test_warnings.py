@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from PIL import Image
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.io.volumes import read_volume
 
 pytestmark = pytest.mark.gl
 
@@ -24,12 +22,6 @@ def plotter():
     plotter = pv.Plotter(off_screen=True, window_size=(48, 32))
     yield plotter
     plotter.close()
-
-
-def slices_that_are_missing(plotter, tmp_path):
-    for number in (1, 2, 5):
-        Image.fromarray(np.full((4, 4), number, np.uint8)).save(tmp_path / f"{number}.png")
-    read_volume(tmp_path)
 
 
 def an_effect_that_does_not_see_it(plotter, tmp_path):
@@ -45,7 +37,6 @@ def a_camera_that_looks_away(plotter, tmp_path):
 
 CASES = [
     a_camera_that_looks_away,
-    slices_that_are_missing,
     an_effect_that_does_not_see_it,
 ]
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
@@ -34,19 +32,6 @@ def image(tmp_path):
     group.attrs["multiscales"] = [{"version": "0.4", "axes": axes, "datasets": datasets}]
     group.attrs["omero"] = {"channels": [{"label": "dapi"}, {"label": "gfp"}]}
     return path
-
-
-def test_info_tells_levels_and_reads_no_voxel(image, capsys):
-    for chunk in (file for file in image.rglob("*") if file.name[0] in "01" and file.is_file()):
-        chunk.write_bytes(b"rubbish")
-    assert main(["info", str(image)]) == 0
-    said = capsys.readouterr().out
-    for part in ("OME-Zarr 0.4", '{"c": 2, "z": 16, "y": 24, "x": 32}', '"points": [16, 12, 8]'):
-        assert part in said
-    assert main(["info", str(image), "--json"]) == 0
-    about = json.loads(capsys.readouterr().out)
-    assert about["range"] is None
-    assert about["channels"] == ["dapi", "gfp"]
 
 
 @pytest.mark.extension("large")

@@ -48,13 +48,12 @@ NO_TARGET = ("''", "old.txt", "folder{}", "none/a{}", "old.png/a{}")
 
 #: Wrong values of options that are alike.
 ALIKE = {
-    NO_NUMBER: "azimuth degrees elevation time turn",
-    BELOW_0: "ambient diffuse specular specular-power tolerance view-cone transmittance-cutoff "
-    "occlusion-strength",
-    NOT_ABOVE_0: "fps full-fps half-angle lists max-bytes memory-limit occlusion-radius "
-    "opacity-unit-distance parallel-scale rate sample-distance target-angle target-fps "
+    NO_NUMBER: "azimuth elevation time",
+    BELOW_0: "ambient diffuse specular specular-power tolerance view-cone transmittance-cutoff",
+    NOT_ABOVE_0: "full-fps half-angle lists max-bytes memory-limit "
+    "opacity-unit-distance parallel-scale sample-distance target-angle target-fps "
     "target-ssim thickness view-angle",
-    NO_COUNT: "frames generations max-supersegments n-colors repeats views",
+    NO_COUNT: "generations max-supersegments n-colors repeats views",
     NO_WHOLE: "compression-level port time-index level",
     NO_XYZ: "focal-point origin position spacing view-up",
     NO_CHOICE: "classification compression draw interpolation precision preference quality "
@@ -65,82 +64,37 @@ ALIKE = {
 }
 #: Wrong values of each option.
 WRONG = {
-    "--allow-host": (),  # any text
-    "--ambient": BELOW_0,
-    "--angles": ("x", "''", "5,nan", "5;6", "5,5", "inf"),
-    "--azimuth": NO_NUMBER,
-    "--background": ("x", "''", "0,0", "0,0,2", "0,0,nan", "#12"),
-    "--camera-json": NO_JSON,
-    "--check": (),  # depends on what is installed
-    "--classification": NO_CHOICE,
-    "--clim": ("x 1", "0 nan", "inf 1", "2 1"),
-    "--cmap": ("nothing", "''", "1", "nan"),
-    "--compression": NO_CHOICE,
-    "--compression-level": (*NO_WHOLE, "0", "-1", "10"),
-    "--criterion": ("nothing", "''", "1", "nan"),
+    **{f"--{name}": wrong for wrong, names in ALIKE.items() for name in names.split()},
+    "--angles": ("x", "''", "5,nan", "5,5"),
+    "--background": ("x", "0,0", "0,0,2", "0,0,nan", "#12"),
     "--device": ("nothing", "99", "-1"),
-    "--diffuse": BELOW_0,
-    "--draw": NO_CHOICE,
-    "--elevation": NO_NUMBER,
-    "--example": ("nothing", "''", "v.npy"),
-    "--focal-point": NO_XYZ,
-    "--full-fps": NOT_ABOVE_0,
-    "--generations": NO_COUNT,
-    "--half-angle": (*NOT_ABOVE_0, "181"),
     "--host": ("'no such host'", "999.1.1.1"),
-    "--importance": ("x", "''", "1,nan", "5"),
-    "--interpolation": NO_CHOICE,
-    "--lists": NOT_ABOVE_0,
-    "--max-bytes": NOT_ABOVE_0,
-    "--max-supersegments": (*NO_COUNT, "4097"),
-    "--memory-limit": (*NOT_ABOVE_0, "5parsecs"),
-    "--n-colors": NO_COUNT,
     "--opacity": ("nothing", "''", "0,x", "0,nan", "0,1e999"),
-    "--opacity-unit-distance": NOT_ABOVE_0,
-    "--origin": NO_XYZ,
-    "--parallel-scale": NOT_ABOVE_0,
-    "--port": (*NO_WHOLE, "-1", "65536"),
-    "--position": NO_XYZ,
-    "--precision": NO_CHOICE,
-    "--preference": NO_CHOICE,
-    "--quality": NO_CHOICE,
-    "--regenerate": NO_CHOICE,
-    "--repeats": NO_COUNT,
-    "--sample-distance": NOT_ABOVE_0,
-    "--scalars": ("nothing", "''"),
-    "--series": (),  # any text: what a file lacks is said when it is read
     "--size": ("x", "''", "12", "0x3", "-1x3", "12xnan", "99999x3", "3x2x1"),
     "--sweep": ("nothing", "''", "lists=x", "lists=0", "precision=x", "skip-empty=1"),
     "--times": ("x", "''", "1,nan"),
     "--token": ("''",),
-    "--tolerance": BELOW_0,
-    "--transfer-function": NO_JSON,
-    "--transmittance-cutoff": (*BELOW_0, "1"),
-    "--value-range": ("x 1", "0 nan", "inf 1", "2 1"),
-    "--view-angle": (*NOT_ABOVE_0, "180"),
-    "--view-cone": (*BELOW_0, "91"),
-    "--view-up": (*NO_XYZ, "0 0 0"),
-    "--views": NO_COUNT,
-    # Of stores of chunks, which refuse more
-    "--channel": (),
-    "--scheduler": (),
-    "--level": ("x", "''", "-1", "1.5"),
-    "--time-index": NO_WHOLE,
+    # Of any text, or what depends on what is installed, or what a store of chunks refuses
+    **dict.fromkeys(("--allow-host", "--series", "--channel", "--scheduler"), ()),
 }
 #: Where a verb's option is another than others'.
 OF_A_VERB = {
     ("serve", "--lists"): WRONG["--size"],
     ("view", "--target-fps"): BELOW_0,
     ("convert", "--thickness"): NO_NUMBER,
-    ("tradeoff", "--repeats"): NO_COUNT,
-    ("generate", "--output"): tuple(name.format(".vdi") for name in NO_TARGET),
-    ("render", "--output"): tuple(name.format(".png") for name in NO_TARGET),
-    ("view", "--screenshot"): tuple(name.format(".png") for name in NO_TARGET),
-    ("convert", "--output"): tuple(name.format(".vdi") for name in NO_TARGET),
-    ("series", "--output"): tuple(name.format(".vdis") for name in NO_TARGET),
-    ("set", "--output"): tuple(name.format(".vdiset") for name in NO_TARGET),
     ("compare", "--out"): ("v.npy", "v.npy/a"),
     ("tradeoff", "--out"): ("v.npy", "v.npy/a"),
+    ("view", "--screenshot"): tuple(name.format(".png") for name in NO_TARGET),
+    **{
+        (verb, "--output"): tuple(name.format(suffix) for name in NO_TARGET)
+        for verb, suffix in {
+            "generate": ".vdi",
+            "convert": ".vdi",
+            "render": ".png",
+            "series": ".vdis",
+            "set": ".vdiset",
+        }.items()
+    },
 }
 #: Files in place of the verb's first.
 FILES = {

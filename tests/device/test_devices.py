@@ -119,39 +119,3 @@ def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
         assert ('pip install "pyvista-vdi[cpu]"' in text) != installed
         assert ("pocl-opencl-icd" in text) != installed
         assert ("unset OCL_ICD_VENDORS" in text) == installed
-
-
-@pytest.mark.skipif(icd.intel_library() is None, reason="pip's driver is not installed")
-def test_pyopencl_imported_first_finds_pip_s_driver_or_says_which_import_to_move():
-    listed = "import pyvista_vdi\nprint(pyvista_vdi.describe_devices())\n"
-    asked = (
-        "import contextlib\nwith contextlib.suppress(pyopencl.Error): pyopencl.get_platforms()\n"
-    )
-    alone, first = run_python(listed), run_python("import pyopencl\n" + listed)
-    assert first.stdout == alone.stdout, first.stderr
-    late = run_python("import pyopencl\n" + asked + listed).stdout
-    assert late.count("move  import pyopencl  below the first use of a device") == 1, late
-    assert "pip install" not in late
-
-
-def test_once_listed_devices_come_without_a_lock():
-    """A finalizer that frees device memory may come here wherever its thread holds one."""
-    done = run_python(
-        "import contextlib, threading\n"
-        "made, make = [], threading.RLock\n"
-        "threading.RLock = lambda: made.append(make()) or made[-1]\n"
-        "from pyvista_vdi.device import devices\n"
-        "threading.RLock = make\n"
-        "devices.find_devices()\n"
-        "found = []\n"
-        "asks = threading.Thread(\n"
-        "    target=lambda: found.extend([devices.opencl().__name__, devices.find_devices()]),\n"
-        "    daemon=True)\n"
-        "with contextlib.ExitStack() as held:\n"
-        "    assert made\n"
-        "    for lock in made: held.enter_context(lock)\n"
-        "    asks.start()\n"
-        "    asks.join(60)\n"
-        "print(*found[:1])"
-    )
-    assert done.stdout == "pyopencl\n", done.stderr

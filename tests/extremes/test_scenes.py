@@ -158,7 +158,6 @@ SCALARS = {
     "checkerboard": (CHECKERS, "float32", 0, 1),
     "int16 full range": ((FIELD - 0.5) * 65535, "int16", -32768, 32767),
     "uint32 full range": (FIELD * 4.2e9, "uint32", 0, 2**32 - 1),
-    "uint16 between values": (60000 + FIELD * 100, "uint16", 60000.3, 60002.7),
     "float32 one denormal": (FIELD * 1.4e-44, "float32", 0, 1.4e-44),
     "float32 both ends": ((FIELD - 0.5) * 6.7e38, "float32", -3.35e38, 3.35e38),
     "float32 a Kelvin": (300 + FIELD * 0.02, "float32", 300.001, 300.019),
@@ -171,10 +170,7 @@ SCALARS = {
 def test_scalars(runtime, worst, name):
     values, dtype, low, high = SCALARS[name]
     values = np.round(values) if dtype[0] in "ui" else values
-    interpolations = ["nearest", "linear"] if dtype == "float32" and high == 1 else ["linear"]
-    for interpolation in interpolations:
-        function = transfer(low, high, interpolation=interpolation)
-        check(runtime, worst, Volume(values.astype(dtype)), function)
+    check(runtime, worst, Volume(values.astype(dtype)), transfer(low, high))
 
 
 @pytest.mark.parametrize(
@@ -221,19 +217,6 @@ def test_gradients_from_denormal_to_huge(runtime, worst, scale, name):
     """Gradients whose squares float32 does not hold: densities in kg/m3, or counts of atoms."""
     volume, function = Volume((FIELD * scale).astype(np.float32)), look(name, scale)
     check(runtime, worst, volume, transfer(0, scale, **function), (0, 8), lit=True)
-
-
-@pytest.mark.parametrize(
-    ("unit", "opacity"),
-    [(1e-8, 1.0), (1.0, 1 - 2.0**-24), (1.0, 1e-7), (1e8, 0.5)],
-)
-def test_unit_distance_and_opacity(runtime, worst, unit, opacity):
-    """Unit distances per extent, and extinctions with them; opacities from hardly any to all."""
-    volume = field_volume()
-    function = transfer(unit_distance=unit * volume.length, opacity=opacity)
-    # Even what is nearly nothing is there to a few digits: below 2^-25 alpha alone would be 0
-    drawn = 0 if opacity / unit < 1e-6 or unit > 1 else 3
-    check(runtime, worst, volume, function, (0, 25, 180), least_drawn=drawn)
 
 
 #: Tables of 33 opacities over 0..1.

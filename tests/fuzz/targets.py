@@ -14,7 +14,6 @@ import io as text_io
 import itertools
 import json
 import os
-import re
 import tempfile
 import tracemalloc
 import warnings
@@ -38,7 +37,6 @@ from pyvista_vdi.errors import VDIError, VDIWarning
 from pyvista_vdi.extensions.series import series as series_files
 from pyvista_vdi.extensions.sets import vdi_set as set_files
 from pyvista_vdi.extensions.web import source as served
-from pyvista_vdi.extensions.web.page import DATA_TYPE
 
 #: Bytes that a byte of a file may become (docs/dev/robustness.md): 128 KiB from 4 bytes is
 #: Zstandard's best, and an array is held twice while it is decoded, a third time as the VDI's.
@@ -48,9 +46,6 @@ OWN_BYTES = 8 * 2**20
 
 #: What a device may be asked for while fuzzing: pictures and VDIs stay small.
 DEVICE_BYTES = 64 * 2**20
-
-#: A page's element with the VDI, in base64.
-_DATA = re.compile(rb'<script type="%b">([^<]*)' % re.escape(DATA_TYPE).encode())
 
 #: A look for what has none.
 DARKENING = TransferFunction([[1, 1, 1], [0, 0, 0]], [0, 1], (-1000, 3000))
@@ -167,8 +162,7 @@ def base_deferred(index: int = 0) -> DeferredVDI:
     """The same lists with values in place of colours."""
     lists = base_vdi(index)
     mean, spread, share = lists.color.T
-    importance = [(-1000, 0), (3000, 1)] if index % 2 else None
-    about = {"value_range": (-1000, 3000), "unit_distance": 1.5, "importance": importance}
+    about = {"value_range": (-1000, 3000), "unit_distance": 1.5}
     return kept_values(lists, mean, spread / 2, share, **about)
 
 

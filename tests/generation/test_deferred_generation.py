@@ -29,13 +29,13 @@ def columns(array):
     return volume, camera
 
 
-def kept(runtime, array, value_range=None, importance=None, interpolation="nearest", **options):
+def kept(runtime, array, value_range=None, interpolation="nearest", **options):
     volume, camera = columns(array)
     looks = pvdi.TransferFunction([[0] * 3], [0], (0, 1), interpolation=interpolation)
     request = GenerationRequest(
         volume, looks, camera, (NX, NY), GenerationOptions(**options), runtime
     )
-    return generate_deferred(request, Deferral("deferred", value_range, importance))
+    return generate_deferred(request, Deferral("deferred", value_range))
 
 
 def inner(deferred):
@@ -77,20 +77,6 @@ def test_what_is_outside_the_range_ends_a_supersegment_and_is_no_part_of_it(runt
         wanted = (inside[:, y, x] * LENGTHS).sum()
         assert (length * one.share[rows]) == pytest.approx(wanted, rel=1e-3)
         assert one.spread[rows] == 0
-
-
-def test_supersegments_are_cut_where_the_importance_tells_values_apart(runtime):
-    """Noise of no weight is not cut, a step of little height but all the weight is."""
-    array = np.random.default_rng(5).uniform(0.4, 0.9, EDGES[::-1]).astype(np.float32)
-    array[:11], array[11:22] = 0.1, 0.2
-    weights = [(0, 1), (0.3, 1), (0.3001, 1e-6), (1, 1e-6)]
-    deferred = kept(runtime, array, (0, 1), weights, max_supersegments=3)
-    for _, _, rows in inner(deferred):
-        assert deferred.mean[rows][1:] == pytest.approx([0.2, 0.1], abs=1e-5)
-        assert deferred.spread[rows][0] > 0.1
-    # Of weight 0 nothing is kept
-    empty = kept(runtime, array, (0, 1), [(0, 1), (0.3, 1), (0.3001, 0), (1, 0)])
-    assert empty.values.max() < 0.3
 
 
 @pytest.mark.parametrize("seed", [1, 3])
@@ -140,7 +126,6 @@ def test_generate_returns_one_and_bakes_by_default(runtime):
         ({"quality": "fast"}, UnsupportedError, "give max_supersegments"),
         ({"blending": "maximum"}, UnsupportedError, "blending"),
         ({"value_range": "all"}, InvalidArgumentError, "value_range must be"),
-        ({"importance": [(2, 1), (1, 1)]}, InvalidArgumentError, "values that grow"),
         ({"classification": "later"}, InvalidArgumentError, "'baked' or 'deferred'"),
         (
             {"classification": "baked", "value_range": (0, 1)},

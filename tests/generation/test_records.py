@@ -159,26 +159,6 @@ def test_merge_error_is_the_growth_of_the_sum_of_squares(call, per_reference, hi
     assert (found >= 0).all()
 
 
-@pytest.mark.parametrize("limit", [2, 39])
-def test_make_room(call, limit):
-    records = [as_runs(s) for s in random_records(62, 64, 100)]
-    found, thresholds = shortened(call, ROOM, records, limit)
-    for before, after, threshold in zip(records, found, thresholds, strict=True):
-        assert 1 <= len(after) <= limit
-        check_shortened(before, after)
-        if len(before) <= limit:
-            np.testing.assert_array_equal(after, before)
-            assert threshold == np.float32(1e-6)
-        else:
-            steps = np.log(threshold / np.float32(1e-6)) / np.log(4)
-            assert steps == pytest.approx(round(steps), abs=1e-3)  # raised, by factors of 4
-            assert steps >= 0
-    # It merges only as far as it must: on the whole a good part of the room stays in use
-    if limit >= 20:
-        long = [len(a) for a, b in zip(found, records, strict=True) if len(b) > limit]
-        assert np.mean(long) > limit / 4
-
-
 @pytest.mark.parametrize(("limit", "hidden_weight"), [(2, 0.5), (20, 0.0)])
 def test_merge_to_limit_is_greedy(call, limit, hidden_weight):
     segments = random_records(63, 48, 45)

@@ -14,9 +14,7 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import (
-    InvalidArgumentError,
     InvalidVolumeError,
-    MissingDependencyError,
     UnsupportedError,
 )
 
@@ -121,19 +119,6 @@ def test_spacing_axes_levels_time_and_channel(image):
         )
 
 
-@pytest.mark.parametrize(
-    ("asked", "message"),
-    [
-        ({"level": 3}, r"from 0, the finest, to 2"),
-        ({"time": 2}, r"has 2 along time, 0 to 1; got 2"),
-        ({"channel": "dapi"}, r"no channel 'dapi'"),
-    ],
-)
-def test_what_is_not_there_is_named(asked, message, ome):
-    with pytest.raises(InvalidArgumentError, match=message):
-        pvdi.read_volume(ome, **asked)
-
-
 def with_transformation(entry):
     return lambda image: image["datasets"][0].update(coordinateTransformations=[entry])
 
@@ -212,10 +197,3 @@ def test_hdf5(tmp_path):
     np.testing.assert_array_equal(again.load().array, VALUES[1, 0])
     np.testing.assert_array_equal(copy.deepcopy(again).store.levels[0].array, VALUES[:, 0])
     assert (again.time, again.spacing) == (1, labelled.spacing)
-
-
-@pytest.mark.parametrize(("name", "library"), [("x.zarr", "zarr"), ("x.h5", "h5py")])
-def test_an_absent_library_is_named(name, library, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, library, None)
-    with pytest.raises(MissingDependencyError, match=r"pip install 'pyvista-vdi\["):
-        pvdi.read_volume(name)

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import gzip
 import struct
-import sys
 
 import numpy as np
 import pytest
-from PIL import Image
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, UnsupportedError, VDIError
@@ -190,26 +188,6 @@ def test_numpy(tmp_path):
 # Pictures
 
 
-def write_slices(folder, pages, suffix="png"):
-    for i, page in enumerate(pages):
-        Image.fromarray(page).save(folder / f"slice_{i}.{suffix}")
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
-def test_pictures_in_a_folder_are_slices(dtype, tmp_path):
-    """In natural order, 9 before 10; the top row is the last along y."""
-    pages = (np.arange(12 * 5 * 7).reshape(12, 5, 7) * 3 % 250).astype(dtype)
-    write_slices(tmp_path, pages, "tif" if dtype == np.float32 else "png")
-    (tmp_path / "notes.txt").write_text("of the scan")
-    check(pvdi.read_volume(tmp_path), pages[:, ::-1], np.eye(4))
-    next(tmp_path.glob("slice_4.*")).unlink()
-    with pytest.warns(pvdi.VDIWarning, match="not evenly spaced"):
-        assert pvdi.read_volume(tmp_path).dimensions == (7, 5, 11)
-
-
-# What is wrong
-
-
 @pytest.mark.parametrize("name", ["a.nii.gz", "a.mha", "a.nrrd", "a.npy", "a.tif"])
 def test_what_is_cut_off_is_refused(name, tmp_path, capfd):
     sitk, image = itk_image(scan())
@@ -250,14 +228,4 @@ def test_what_is_not_read_is_refused_with_the_remedy(name, tmp_path):
     with pytest.raises(
         UnsupportedError, match=r"own library, .*Volume\(array, spacing=, origin=\)"
     ):
-        pvdi.read_volume(tmp_path / name)
-
-
-@pytest.mark.parametrize(
-    ("name", "library"), [("a.nii", "SimpleITK"), ("a.tif", "tifffile"), ("a.dcm", "pydicom")]
-)
-def test_what_is_missing_is_named(name, library, tmp_path, monkeypatch):
-    (tmp_path / name).write_bytes(bytes(2000))
-    monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(pvdi.MissingDependencyError, match=rf'{library}.*"pyvista-vdi\[files\]"'):
         pvdi.read_volume(tmp_path / name)

@@ -68,25 +68,6 @@ def test_list_coordinates(parallel, rng):
     np.testing.assert_allclose([ud / d, vd / d, found], [u, v, depth], rtol=EXACT, atol=EXACT)
 
 
-@given(rng=GENERATORS)
-def test_a_tile_s_rays_are_those_of_its_pixels(rng):
-    """Window, tile and pixel at random, also beyond the window's border."""
-    camera = any_camera(rng)
-    window, tile = rng.integers(1, 400, size=(2, 2))
-    corner = rng.integers(-50, 400, size=2)
-    pixel = rng.integers(0, tile)
-
-    def ray(view, size, place):
-        u, v = (2 * (place + 0.5) / size - 1) * (1, -1)
-        return np.array([[1, u, v] @ part for part in view.ray_coefficients(size)])
-
-    expected = ray(camera, window, corner + pixel)
-    found = ray(camera.tile(window, corner, tile), tile, pixel)
-    # Absolute in units of half the viewport
-    scale = max(camera.half_extent(window))
-    np.testing.assert_allclose(found, expected, rtol=EXACT, atol=EXACT * scale)
-
-
 def vtk_camera(camera):
     pytest.importorskip("pyvista")
     from pyvista_vdi.vtk_pipeline.vtk import vtkCamera

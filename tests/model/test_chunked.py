@@ -80,21 +80,6 @@ class Counted:
 Counted.__module__ = "zarr.test"
 
 
-def test_nothing_is_read_before_it_is_needed():
-    source = Counted()
-    volume = Volume(source)
-    assert (volume.length, volume.dimensions, repr(volume)) == (
-        volume.length,
-        (26, 21, 30),
-        "Volume(26 x 21 x 30 uint8, spacing=(1.0, 1.0, 1.0))",
-    )
-    assert not source.read
-    volume.finite_range()
-    assert len(source.read) == 4 * 3 * 3
-    volume.finite_range()
-    assert len(source.read) == 4 * 3 * 3
-
-
 def test_what_needs_the_whole_array_says_so():
     volume = Volume(Counted())
     camera = Camera((60, 50, 70), (13, 10, 15), (0, 1, 0))

@@ -13,7 +13,6 @@ from pyvista_vdi.cli import main
 from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
-    UnsupportedError,
 )
 from pyvista_vdi.model.classify_values import spread_of_values
 from pyvista_vdi.model.deferred import lengths_of
@@ -32,7 +31,7 @@ def deferred(seed=1, **changes):
 
 
 def test_arrays_are_what_was_given_and_read_only():
-    given = arguments(importance=[0, 1])
+    given = arguments()
     made = kept_values(**given)
     for name in ("mean", "spread", "share"):
         array = getattr(made, name)
@@ -40,7 +39,6 @@ def test_arrays_are_what_was_given_and_read_only():
         assert np.array_equal(array, given[name])
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
-    assert made.importance == ((100, 0), (300, 1))
     assert made.values == pytest.approx(100 + 200 * given["mean"].astype(float))
     assert "100 to 300" in repr(made)
 
@@ -55,7 +53,6 @@ def test_arrays_are_what_was_given_and_read_only():
         ("value_range", None, "low < high"),
         ("unit_distance", 0, "unit_distance must be a length"),
         ("sample_distance", "x", "sample_distance must be a length"),
-        ("importance", [(0, -1), (1, 1)], "weights >= 0"),
     ],
 )
 def test_what_breaks_a_rule_is_refused(name, value, says):
@@ -110,22 +107,6 @@ def test_classification_is_the_mean_over_values_of_that_mean_and_spread():
     assert vdi.metadata["transfer_function"] == LOOKS.to_dict()
 
 
-@pytest.mark.parametrize(
-    ("look", "error", "says"),
-    [
-        ({"shade": True}, UnsupportedError, "shading needs gradients"),
-        ({"blending": "maximum"}, UnsupportedError, "blending"),
-        ({"interpolation": "linear"}, InvalidArgumentError, "interpolation was said"),
-        ({"scalars": "a"}, InvalidArgumentError, "scalars was said"),
-        ({"colour": "bone"}, TypeError, "classified"),
-    ],
-)
-def test_what_no_list_knows_is_refused(look, error, says):
-    pytest.importorskip("pyvista")
-    with pytest.raises(error, match=says):
-        deferred().classified(**look)
-
-
 def test_render_takes_the_look(default_runtime):
     made = deferred()
     picture = pvdi.render(made, made.camera, transfer_function=LOOKS)
@@ -140,7 +121,7 @@ def test_render_takes_the_look(default_runtime):
 
 @pytest.mark.parametrize(("compression", "precision"), [("lz4", "exact"), ("zstd", "8-byte")])
 def test_files_give_back_every_bit(compression, precision, tmp_path):
-    made = deferred(3, importance=[(100, 1), (300, 0.5)]).with_precision(precision)
+    made = deferred(3).with_precision(precision)
     path = made.save(tmp_path / "kept.vdi", compression=compression)
     read = pvdi.read(path)
     assert isinstance(read, DeferredVDI)
@@ -175,7 +156,7 @@ def test_convert_and_render_classify_and_say_what_is_missing(tmp_path, capsys):
     for command, says in (
         (["convert", str(seen), "--cmap", "bone", "-o", "x.vdi"], "has its look"),
         (["convert", str(path), "-o", str(tmp_path / "none.exr")], "have no colours yet: give --c"),
-        (["render", str(seen), str(path), "-o", "x.png"], "kept.vdi keeps values"),
+        (["render", str(path), "-o", "x.png"], "kept.vdi stores scalars"),
     ):
         assert main(command) != 0
         assert says in capsys.readouterr().err

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import Camera
-from pyvista_vdi.model.levels import nearest_depth, required_level
+from pyvista_vdi.model.levels import required_level
 from pyvista_vdi.model.volume import Grid
 
 #: A cube from -1 to 1 at four levels: voxels of 2/64, 2/32, 2/16 and 2/8.
@@ -23,19 +23,6 @@ FROM_TEN = Camera(position=(0, 0, 10), focal_point=(0, 0, 0), view_up=(0, 1, 0),
 def test_level_is_the_coarsest_that_is_no_coarser_than_half_a_list(lists, level):
     for size in ((lists, lists), (2 * lists, lists)):
         assert required_level(LEVELS, FROM_TEN, size) == level
-
-
-def test_only_what_is_in_the_window_is_near():
-    # The cube's edge at x = 1 comes into a window of 90 degrees 2 before the eye, its face at 1
-    view = Camera(position=(3, 0, 2), focal_point=(3, 0, -9), view_up=(0, 1, 0), view_angle=90)
-    assert nearest_depth(LEVELS[0], view, (64, 64)) == pytest.approx(2, rel=1e-12)
-    assert nearest_depth(LEVELS[0], view, (128, 64)) == pytest.approx(1, rel=1e-12)
-    # A turned view, beside points by the dozen
-    view = view.azimuth(25).elevation(-20)
-    points = np.random.default_rng(2).uniform(-1, 1, (400_000, 3))
-    seen = points @ view.view_matrix[:3, :3].T + view.view_matrix[:3, 3]
-    nearest = seen[(np.abs(seen[:, :2]) <= seen[:, 2:]).all(axis=1), 2].min()
-    assert nearest - 0.05 < nearest_depth(LEVELS[0], view, (64, 64)) <= nearest
 
 
 def test_in_the_volume_the_finest_and_past_it_the_coarsest():

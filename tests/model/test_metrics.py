@@ -6,13 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from pyvista_vdi.model.metrics import (
     compare_images,
 )
-from pyvista_vdi.model.standard_cases import filling_camera
 
 
 def picture(seed=0, size=(24, 32), channels=3):
@@ -47,27 +44,3 @@ def test_ssim_is_that_of_wang_et_al():
         (mean_a**2 + mean_b**2 + c1) * (var_a + var_b + c2)
     )
     assert compare_images(a, b).ssim == pytest.approx(ssim[5:-5, 5:-5].mean(), abs=1e-9)
-
-
-@given(
-    edges=st.tuples(*[st.floats(1e-3, 1e3)] * 3),
-    centre=st.tuples(*[st.floats(-1e3, 1e3)] * 3),
-    size=st.tuples(st.integers(1, 2000), st.integers(1, 2000)),
-    azimuth=st.floats(-400, 400),
-    elevation=st.floats(-89, 89),
-    view_angle=st.floats(1, 150),
-)
-def test_the_bounds_just_fill_the_view(edges, centre, size, azimuth, elevation, view_angle):
-    half = np.array(edges) / 2
-    bounds = np.stack([np.array(centre) - half, np.array(centre) + half], axis=1).ravel()
-    camera = filling_camera(bounds, size, azimuth, elevation, view_angle)
-    corners = np.array(np.meshgrid(*bounds.reshape(3, 2))).reshape(3, -1)
-    x, y, z = camera.view_matrix[:3, :3] @ (corners - np.reshape(camera.position, (3, 1)))
-    t_x, t_y = camera.half_extent(size)
-    assert (z > 0).all()
-    reach = max(np.abs(x / (z * t_x)).max(), np.abs(y / (z * t_y)).max())
-    # A margin of 1e-4 half viewports; float64 of coordinates up to 1e3 with edges from 1e-3
-    assert 1 - 1.2e-4 < reach < 1 - 0.8e-4
-    assert np.allclose(camera.focal_point, centre, rtol=0, atol=1e-9)
-    up = np.subtract(camera.position, centre)
-    assert math.degrees(math.asin(up[2] / np.linalg.norm(up))) == pytest.approx(elevation, abs=1e-5)

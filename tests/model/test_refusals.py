@@ -91,19 +91,12 @@ def long_list(count):
 REFUSED = {
     AmbientOcclusion: [
         ({"radius": 0}, "a positive length in model units; got 0"),
-        ({"radius": -1}, "a positive length in model units; got -1"),
-        ({"radius": INF}, "a positive length in model units; got inf"),
         ({"radius": "far"}, "a positive length in model units; got 'far'"),
-        ({"radius": True}, "a positive length in model units; got True"),
-        ({"strength": 1.5}, "strength .* from 0 to 1; got 1.5"),
         ({"strength": NAN}, "strength .* from 0 to 1; got nan"),
-        ({"strength": TWO}, "strength of ambient occlusion must be"),
         ({"directions": 11}, "from 12 to 4096; got 11"),
-        ({"directions": 16.5}, "from 12 to 4096; got 16.5"),
     ],
     AmbientOcclusion.from_any: [
         *each("True, a radius in model units or a pyvista_v", "much", (1, 2), {"radius": 1}),
-        ((HUGE,), "radius of ambient occlusion must be"),
     ],
     Cropping: [
         (((HUGE,) * 6,), "cropping takes six planes"),

@@ -131,3 +131,19 @@ def test_commands_on_pages_are_those_of_the_command_line(verbs):
                 mistakes.append(f"{page.name}: there is no verb {verb}")
     assert not mistakes
     assert seen == set(verbs)
+
+
+def test_pages_for_users_say_the_field_s_words():
+    lines = (DOCS / "dev" / "phrases.txt").read_text(encoding="utf-8").splitlines()
+    phrases = "|".join(re.escape(line) for line in lines if not line.startswith("#"))
+    said = []
+    for page in [*DOCS.glob("*.md"), CHECKOUT / "README.md"]:
+        # What is code, a link's place or a term that is explained stays
+        text = re.sub(
+            r"```.*?```|`[^`]*`|\]\([^)]*\)|^\|.*, V_[ON] \|",
+            "",
+            page.read_text("utf-8"),
+            flags=re.S | re.M,
+        )
+        said += [f"{page.name}: {each}" for each in re.findall(rf"\b(?:{phrases})\b", text)]
+    assert not said

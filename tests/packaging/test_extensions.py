@@ -16,7 +16,7 @@ from pyvista_vdi import registry
 
 TESTS = Path(__file__).parents[1]
 #: Tests of the core: those that name what extensions add, and those run without any extension.
-NAMING, OTHERS = "api cli", "io model generation raycasting plotting vtk_pipeline"
+NAMING, OTHERS = "api cli", "io model generation raycasting"
 
 
 def gone_with(name):

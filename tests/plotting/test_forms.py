@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-import warnings
-
 import numpy as np
 import pytest
 import pyvista as pv
@@ -12,21 +9,15 @@ from plugin_scenes import (
     LOOKS,
     shown,
     soft_ball,
-    vdi_of_one_list,
 )
 from pyvista.plotting.plotter import _ALL_PLOTTERS
 
-import pyvista_vdi as pvdi
-from pyvista_vdi.errors import UnsupportedError, VDIWarning
+from pyvista_vdi.errors import UnsupportedError
 
 pytestmark = pytest.mark.gl
 
 WINDOW = (60, 50)
 #: That the VDI is missing where a scene is written for another renderer.
-MESSAGE = (
-    "exported without its VDI: trame's export_html, export_vtksz and views .* empty box.*"
-    "plotter.vdi.export_html, screenshots"
-)
 
 
 def two_balls():
@@ -58,7 +49,7 @@ def test_blocks_within_blocks_and_none(plotter):
     assert [isinstance(each, list) for each in actors] == [True, False]
     assert plotter.add_vdi(pv.MultiBlock()) == []
     before = len(plotter.renderer.actors)
-    with pytest.raises(UnsupportedError, match="a surface has no volume"):
+    with pytest.raises(UnsupportedError, match="voxelise a surface"):
         plotter.add_vdi(pv.MultiBlock([soft_ball(8), pv.MultiBlock([pv.Sphere()])]))
     assert len(plotter.renderer.actors) == before, "nothing, or all"
 
@@ -79,16 +70,6 @@ def test_a_rectilinear_grid_of_equidistant_points_is_the_uniform_grid(plotter, d
     axis[3] += 0.001
     with pytest.raises(UnsupportedError, match=r"not a uniform grid.*resample"):
         plotter.add_vdi(pv.RectilinearGrid(axis, axis, axis))
-
-
-def test_names_of_vtk_s_mappers_mean_nothing_and_are_noted(plotter):
-    with pytest.warns(VDIWarning, match="mapper='gpu' chooses among VTK's.*is ignored"):
-        plotter.add_vdi(soft_ball(8), mapper="gpu", multi_colors=True, name="it", **LOOKS)
-    named = shown(plotter)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        plotter.add_vdi(soft_ball(8), name="it", **LOOKS)
-    np.testing.assert_array_equal(shown(plotter), named)
 
 
 def test_plot_of_a_grid_is_what_a_plotter_shows(plotter):
@@ -121,56 +102,3 @@ def test_a_plot_that_is_refused_leaves_no_plotter():
     with pytest.raises(TypeError, match="'opcity': did you mean 'opacity'"):
         soft_ball(8).vdi.plot(off_screen=True, opcity=1)
     assert before == _ALL_PLOTTERS
-
-
-def test_help_is_the_method_s(plotter):
-    for found in (plotter.add_vdi, type(plotter).add_vdi):
-        assert inspect.getdoc(found).startswith("Add a volume that turns fluently")
-        assert "max_supersegments : int" in inspect.getdoc(found)
-    assert next(iter(inspect.signature(plotter.add_vdi).parameters)) == "volume"
-
-
-def added(plotter):
-    actor = plotter.add_vdi(soft_ball(8), show_scalar_bar=False)
-    plotter.add_mesh(pv.Sphere())
-    plotter.show(auto_close=False)
-    return actor.mapper
-
-
-def serialized(mapper):
-    """What the serialisers of trame-vtk and of vtkmodules.web ask a volume mapper for."""
-    mapper.GetInputAlgorithm().Update()
-    return mapper.GetInputDataObject(0, 0)
-
-
-def test_asking_for_the_data_to_be_exported_warns_once_and_nothing_else_does(plotter):
-    mapper = added(plotter)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        plotter.render()
-        plotter.screenshot(return_img=True)
-        plotter.reset_camera()
-        assert len(plotter.meshes) == 2
-        mapper.dataset  # noqa: B018
-        assert mapper.GetInput() is not None
-    with pytest.warns(VDIWarning, match=MESSAGE):
-        proxy = serialized(mapper)
-    assert proxy.GetDimensions() == (2, 2, 2)
-    serialized(mapper)  # warnings are errors: it is not said again
-    alone = pvdi.VDIMapper()  # VTK's own
-    alone.SetVDI(vdi_of_one_list())
-    with pytest.warns(VDIWarning, match=MESSAGE):
-        serialized(alone)
-
-
-@pytest.mark.parametrize("what", ["export_html", "export_vtksz"])
-@pytest.mark.parametrize("of", ["plotter", "plotter.trame"])
-def test_exports_of_trame_warn(plotter, what, of):
-    """PyVista's own name them deprecated as well, and call them."""
-    pytest.importorskip("trame_pyvista")
-    added(plotter)
-    export = getattr(plotter if of == "plotter" else plotter.trame, what)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", pv.PyVistaDeprecationWarning)
-        with pytest.warns(VDIWarning, match=MESSAGE):
-            export(None)

@@ -1,9 +1,8 @@
 """A real browser: Chromium, driven by Playwright, with WebGL 2 by SwiftShader.
 
 ``PYVISTA_VDI_CHROMIUM`` names an executable where it is not in the path, or not the first there;
-``PYVISTA_VDI_REQUIRE_BROWSER=1`` makes a missing one a failure, as in CI. All tests of a process
-have one browser; Playwright keeps an event loop running in its thread, so a file of tests has a
-connection of its own, which ends with it.
+``PYVISTA_VDI_REQUIRE_BROWSER=1`` makes a missing one a failure, as in CI. Playwright keeps an event
+loop running in its thread, so a file of tests has a browser of its own, which ends with it.
 """
 
 from __future__ import annotations
@@ -14,8 +13,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import time
 from importlib import resources
 from pathlib import Path
 
@@ -127,35 +124,20 @@ def missing(reason):
     pytest.skip(reason)
 
 
-@pytest.fixture(scope="session")
-def browser_address(tmp_path_factory):
-    """Where a browser listens that ends with the tests."""
-    named = os.environ.get("PYVISTA_VDI_CHROMIUM")
-    names = (named,) if named else (WITHOUT_WINDOWS, *NAMES)
-    executable = next(filter(None, map(shutil.which, names)), None)
-    if executable is None:
-        missing(f"none of {', '.join(names)} is in the path: install the package 'chromium'")
-    profile = tmp_path_factory.mktemp("chromium")
-    options = ["--headless", "--remote-debugging-port=0", f"--user-data-dir={profile}", *FLAGS]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with subprocess.Popen([executable, *options, "about:blank"], **quiet) as process:
-        told = profile / "DevToolsActivePort"
-        while not (told.exists() and "\n" in told.read_text()):
-            assert process.poll() is None, f"{executable} has ended"
-            time.sleep(0.05)
-        yield f"http://127.0.0.1:{told.read_text().split()[0]}"
-        process.terminate()
-
-
 @pytest.fixture(scope="module")
-def chromium(browser_address):
+def chromium():
     """A browser, Playwright's."""
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
         missing("playwright is not installed: pip install playwright")
+    named = os.environ.get("PYVISTA_VDI_CHROMIUM")
+    names = (named,) if named else (WITHOUT_WINDOWS, *NAMES)
+    executable = next(filter(None, map(shutil.which, names)), None)
+    if executable is None:
+        missing(f"none of {', '.join(names)} is in the path: install the package 'chromium'")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.connect_over_cdp(browser_address)
+        browser = playwright.chromium.launch(executable_path=executable, args=[*FLAGS])
         yield browser
         browser.close()
 

@@ -1,4 +1,4 @@
-"""The engine's VDIs, pictures, depths and picks, with options by name as in public functions."""
+"""The engine's VDIs, pictures and depths, with options by name as in public functions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, MediumOptions
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting import multi_vdi, picking, raycast
+from pyvista_vdi.raycasting import multi_vdi, raycast
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
 from pyvista_vdi.volume import render
 
@@ -70,14 +70,6 @@ def render_first_hits(
     """The depths of first hits."""
     hit = FirstHit.of(opacity_threshold, accumulated)
     return raycast.render_first_hits(vdi, frame(vdi, camera, size, **options), hit)
-
-
-def pick_vdi(
-    vdi, camera, pixel, size=None, *, opacity_threshold=DEFAULT_OPACITY, accumulated=True, **options
-):
-    """What a pixel shows."""
-    hit = FirstHit.of(opacity_threshold, accumulated)
-    return picking.pick_vdi(vdi, frame(vdi, camera, size, **options), pixel, hit)
 
 
 def draw(prepared, camera, size, image, *, first_hit=None, **options):

@@ -56,22 +56,20 @@ class Maker(VTKPythonAlgorithmBase):
     """A source that gives ``image``: each time that array, whatever was written into it.
 
     ``does`` says how it fails: "return 0", "raise", "nothing" (an image without points) or
-    "no scalars". ``times`` are steps, the image's values being scaled by the time. Unless it is
-    ``silent``, it announces what VTK's filters behind it ask for, and not the extent alone.
+    "no scalars". ``times`` are steps, the image's values being scaled by the time.
     """
 
-    def __init__(self, image, times=(), *, silent=False):
+    def __init__(self, image, times=()):
         super().__init__(nInputPorts=0, nOutputPorts=1, outputType="vtkImageData")
-        self.image, self.times, self.silent, self.does = image, times, silent, ""
+        self.image, self.times, self.does = image, times, ""
 
     def RequestInformation(self, request, inputs, outputs):
         information, pipeline = outputs.GetInformationObject(0), vtkStreamingDemandDrivenPipeline
         information.Set(pipeline.WHOLE_EXTENT(), self.image.GetExtent(), 6)
-        if not self.silent:
-            information.Set(vtkImageData.SPACING(), self.image.GetSpacing(), 3)
-            information.Set(vtkImageData.ORIGIN(), self.image.GetOrigin(), 3)
-            kind = self.image.GetPointData().GetScalars().GetDataType()
-            vtkDataObject.SetPointDataActiveScalarInfo(information, kind, 1)
+        information.Set(vtkImageData.SPACING(), self.image.GetSpacing(), 3)
+        information.Set(vtkImageData.ORIGIN(), self.image.GetOrigin(), 3)
+        kind = self.image.GetPointData().GetScalars().GetDataType()
+        vtkDataObject.SetPointDataActiveScalarInfo(information, kind, 1)
         if self.times:
             information.Set(pipeline.TIME_STEPS(), self.times, len(self.times))
             information.Set(pipeline.TIME_RANGE(), (self.times[0], self.times[-1]), 2)
@@ -104,11 +102,8 @@ class Maker(VTKPythonAlgorithmBase):
 
 def property_of(*opacity, color=0.0, unit=2.0):
     """A volume property with these nodes of opacity, over 0 to 255."""
-    prop, colors, opacities = (
-        vtkVolumeProperty(),
-        vtkColorTransferFunction(),
-        vtkPiecewiseFunction(),
-    )
+    prop = vtkVolumeProperty()
+    colors, opacities = vtkColorTransferFunction(), vtkPiecewiseFunction()
     for at, r, g, b in ((0, color, 0.3, 0.9), (120, 0.3, 0.9, color), (255, 1.0, 0.5, 0.2)):
         colors.AddRGBPoint(at, r, g, b)
     for at, share in opacity or ((0, 0), (255, 0.6)):

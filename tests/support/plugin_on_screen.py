@@ -7,7 +7,6 @@ timers. It prints what failed and ends with status 1, or prints "all well".
 from __future__ import annotations
 
 import sys
-import threading
 import time
 import traceback
 import warnings
@@ -92,7 +91,6 @@ def previews_and_screenshots():
 def new_vdi_appears_by_itself():
     """At rest a VDI is made behind the frames, and shown without a frame being asked for."""
     plotter, actor = scene(regenerate="auto", settings=pvdi.Settings(regenerate_below=0.9999))
-    actor.show_status(plotter)
     plotter.show(interactive_update=True, auto_close=False)
     old = actor.vdi
     hand = Hand(plotter)
@@ -105,28 +103,6 @@ def new_vdi_appears_by_itself():
     assert actor.vdi is not old
     assert actor.status.angle < 1e-6
     assert plotter.camera.position == turned
-    wait(plotter, lambda: not actor.mapper.driver.following)
-    plotter.close()
-
-
-def held_still_nothing_turns_and_moving_shows_the_new_vdi():
-    """No timer of ours turns the view while a button is held; the next motion shows the new VDI."""
-    plotter, actor = scene(regenerate=lambda status: status.angle > 5)
-    plotter.show(interactive_update=True, auto_close=False)
-    hand = Hand(plotter)
-    plotter.camera.Azimuth(10)
-    plotter.render()
-    assert actor.mapper.driver.following
-    hand.press(100, 100)
-    assert not actor.mapper.driver.following
-    hand.move(95, 100)  # away from the VDI's view
-    held = plotter.camera.position
-    wait(plotter, lambda: actor.status.progress is None)
-    assert plotter.camera.position == held
-    assert actor.status.generation == 1
-    hand.move(94, 100)
-    assert actor.status.generation == 2
-    hand.release(94, 100)
     wait(plotter, lambda: not actor.mapper.driver.following)
     plotter.close()
 
@@ -155,26 +131,10 @@ def show_blocks_and_the_new_vdi_comes():
     assert not others
 
 
-def closing_in_the_middle():
-    """Closing while a VDI is made leaves neither thread nor crash."""
-    plotter, actor = scene(
-        settings=pvdi.Settings(sample_distance=0.002), regenerate=lambda status: status.angle > 5
-    )
-    plotter.show(interactive_update=True, auto_close=False)
-    plotter.camera.Azimuth(30)
-    plotter.render()
-    assert actor.status.progress is not None
-    plotter.close()
-    left = [t for t in threading.enumerate() if t.name.startswith("pyvista-vdi")]
-    assert not left, left
-
-
 CASES = (
     previews_and_screenshots,
     new_vdi_appears_by_itself,
-    held_still_nothing_turns_and_moving_shows_the_new_vdi,
     show_blocks_and_the_new_vdi_comes,
-    closing_in_the_middle,
 )
 
 

@@ -333,7 +333,6 @@ def kept_values(
     value_range=(100, 300),
     unit_distance=2.0,
     sample_distance=0.5,
-    importance=None,
     metadata=None,
 ):
     """Return a DeferredVDI of some lists, with these values in place of their colours."""
@@ -342,7 +341,6 @@ def kept_values(
         "value_range": value_range,
         "unit_distance": unit_distance,
         "sample_distance": sample_distance,
-        "importance": importance,
     }
     faces = lists.camera, lists.window_size, lists.offsets, lists.front, lists.back
     color = np.stack([mean, np.zeros_like(mean), share], axis=1)

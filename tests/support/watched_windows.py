@@ -14,8 +14,6 @@ from pyvista_vdi.quality import background
 from pyvista_vdi.quality.rate import FrameRate
 from pyvista_vdi.quality.view_error import ViewError
 from pyvista_vdi.vtk_pipeline.drawing import background as making
-from pyvista_vdi.vtk_pipeline.drawing import images
-from pyvista_vdi.vtk_pipeline.interaction import window
 from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkUnsignedCharArray
 
 #: Odd, so that no smaller image divides it.
@@ -58,32 +56,6 @@ def coarsest(monkeypatch):
 
 
 @pytest.fixture
-def counted(monkeypatch):
-    """A clock that counts a microsecond per ray; ``dear`` is how many microseconds it is.
-
-    VDIs that are drawn together take none of it.
-    """
-
-    class Clock:
-        def __init__(self):
-            self.now, self.dear = 0.0, 1.0
-
-        def perf_counter(self):
-            return self.now
-
-    clock = Clock()
-    render_vdi = images.render_vdi
-
-    def timed(vdi, request):
-        clock.now += clock.dear * 1e-6 * request.size[0] * request.size[1]
-        return render_vdi(vdi, request)
-
-    monkeypatch.setattr(images, "render_vdi", timed)
-    monkeypatch.setattr(window, "time", clock)
-    return clock
-
-
-@pytest.fixture
 def no_estimates(monkeypatch):
     """Counts estimates, and answers each at once with ``answer.ssim``."""
 
@@ -97,10 +69,9 @@ def no_estimates(monkeypatch):
         def __init__(self, *_, **__):
             pass
 
-        def estimate(self, vdi, camera, size, **shown):
+        def estimate(self, *_, **__):
             answer.asked += 1
-            answer.camera, answer.shown = camera, shown
-            return ViewError(answer.ssim, 0.0, 0.0, 1.0, 1)
+            return ViewError(answer.ssim, 0.0, 1.0, 1)
 
     monkeypatch.setattr(making, "ViewErrorEstimator", Estimator)
     return answer

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-
 import numpy as np
 import pytest
 import pyvista as pv
@@ -58,15 +56,3 @@ def test_a_grid_is_read_again_when_it_has_changed(runtime, uploads, what):
     found = picture(grid, runtime)
     assert np.abs(found - first).max() > 0.05
     np.testing.assert_array_equal(found, picture(pvdi.Volume.from_vtk(grid), runtime))
-
-
-def test_what_is_kept_ends_with_the_grid(runtime):
-    grid = pv.ImageData(dimensions=(12, 10, 8))
-    grid["s"] = np.linspace(0, 1, 960, dtype=np.float32)
-    gc.collect()
-    before = runtime.allocated
-    picture(grid, runtime)
-    assert runtime.allocated > before
-    del grid
-    gc.collect()
-    assert runtime.allocated == before

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH
-
 EPS = 2.0**-24  # unit roundoff of float32
 FILE = "medium_functions.cl"
 
@@ -53,29 +51,6 @@ def test_linear_between_entries_and_clamped_outside(call, entries, span):
     assert (found <= 1 + 2 * EPS).all()
 
 
-def test_ends_are_the_end_entries_to_the_last_bit(call):
-    table = random_table(np.random.default_rng(5), 7)
-    found = classified(call, [-3e38, -np.inf, 2.0, 3.0, 3e38, np.inf], table, 2.0, 3.0)
-    np.testing.assert_array_equal(found[:3], np.broadcast_to(table[0], (3, 4)))
-    # mix(x, y, 1) is x + (y - x), a rounding of the difference and one of the sum
-    assert np.abs(found[3:] - table[-1]).max() <= 2 * EPS
-    # A range of one scalar is a step: at or below it the first entry, above it the last
-    for at in (0.0, 7.0, -1e6, 3e-5):
-        near = np.float32(at)
-        above = np.nextafter(near, np.float32(np.inf)) if at else np.float32(1e-30)
-        below = np.nextafter(near, np.float32(-np.inf))
-        found = classified(call, [-1e30, below, near, above, 1e30], table, near, near)
-        np.testing.assert_array_equal(found[:3], np.broadcast_to(table[0], (3, 4)))
-        assert np.abs(found[3:] - table[-1]).max() <= 2 * EPS
-
-
-def test_nan_is_transparent(call):
-    table = np.ones((4, 4), np.float32)
-    for low, high in ((0.0, 1.0), (0.5, 0.5)):
-        found = classified(call, [np.nan, -np.nan, 0.5], table, low, high)
-        np.testing.assert_array_equal(found, [[0] * 4, [0] * 4, [1] * 4])
-
-
 def test_step_optical_depth(call):
     rng = np.random.default_rng(7)
     below_one = 1 - 2.0**-24
@@ -90,12 +65,6 @@ def test_step_optical_depth(call):
     assert (np.abs(found - exact) <= 6 * EPS * exact).all()
     assert found[0] == 0
     assert found[4] == pytest.approx(24 * np.log(2) * units[4], rel=6 * EPS)
-
-
-def test_an_opaque_sample_is_opaque_whatever_the_step(call):
-    units = np.float32([0, 1e-30, 1e-3, 1, 30, 31, 1e6])
-    found = call(FILE, "step_optical_depths", 7, np.ones(7, np.float32), units, call.empty(7))
-    np.testing.assert_array_equal(found, np.maximum(np.float32(OPAQUE_OPTICAL_DEPTH), units))
 
 
 @pytest.mark.parametrize("lanes", [1, 16])

@@ -67,16 +67,6 @@ def cropped(s):
     s.mapper.SetCroppingRegionPlanes(4, 9, 4, 9, 4, 9)
 
 
-def chosen(s, array="w"):
-    by_name = isinstance(array, str)
-    s.mapper.SetScalarModeToUsePointFieldData()
-    if hasattr(s.mapper, "SetArrayName"):
-        (s.mapper.SetArrayName if by_name else s.mapper.SetArrayId)(array)
-    else:  # older VTKs
-        s.mapper.SelectScalarArray(array)
-    s.mapper.SetArrayAccessMode(int(by_name))
-
-
 def color_image(s):
     """Have the picture drawn into an image, and return it, RGB over black."""
     s.mapper.RenderToImageOn()
@@ -152,8 +142,6 @@ SAME = {
     "Cropping": cropped,
     "FinalColorWindow": lambda s: s.mapper.SetFinalColorWindow(0.6),
     "FinalColorLevel": lambda s: s.mapper.SetFinalColorLevel(0.3),
-    "ArrayName": chosen,
-    "ArrayId": lambda s: chosen(s, 1),
     "ImageSampleDistance": lambda s: s.mapper.SetImageSampleDistance(2.0),
     "Input": lambda s: s.mapper.GetInput().GetDimensions(),
     "RenderToImage": color_image,
@@ -191,17 +179,12 @@ if hasattr(vtkCommonCore, "vtkSOATypeFloat32Array"):
 
 #: Changes that are refused, and words of it where the name is not among them.
 REFUSED = {
-    "ScalarModeToUseCellFieldData": (
-        lambda s: s.mapper.SetScalarModeToUseCellFieldData(),
-        "values at points.*SelectScalarArray",
-    ),
+    "SelectScalarArray": (lambda s: s.mapper.SelectScalarArray("w"), "VDISource.SetScalars"),
     "BlendMode": (lambda s: s.mapper.SetBlendModeToAdditive(), ""),
     "AddInputConnection": (
         lambda s: s.mapper.AddInputConnection(0, s.source.GetOutputPort()),
         "",
     ),
-    "DepthImage": (lambda s: s.mapper.GetDepthImage(vtkImageData()), ""),
-    "UseDepthPass": (lambda s: s.mapper.UseDepthPassOn(), ""),
     "MaskInput": (
         lambda s: s.mapper.SetMaskInput(image_of(values().ravel().astype(np.uint8))),
         "",
@@ -212,12 +195,6 @@ REFUSED = {
     "clipped voxels": (lambda s: s.prop.UseClippedVoxelIntensityOn(), ""),
     "CoordinateSystem": (lambda s: s.actor.SetCoordinateSystemToPhysical(), ""),
     "ShaderProperty": (lambda s: s.actor.SetShaderProperty(vtkOpenGLShaderProperty()), ""),
-    "AddFragmentShaderReplacement": (
-        lambda s: s.actor.GetShaderProperty().AddFragmentShaderReplacement(
-            "//VTK::Shading::Impl", True, "g_fragColor.g = 1.0;", False
-        ),
-        "",
-    ),
     "have 2 components": (with_scalars(lambda v: np.stack([v, v], -1)), ""),
     "rectilinear": (image_with(rectilinear), "not a uniform grid.*resample"),
 }
@@ -277,10 +254,8 @@ def test_without_effect(off_screen, name):
 def test_what_turns_a_refused_thing_off_is_accepted(off_screen):
     scene = Scene(True)
     before = scene.picture()
-    for setter in ("BlendMode", "UseDepthPass", "GlobalIlluminationReach", "ClampDepthToBackface"):
+    for setter in ("BlendMode", "GlobalIlluminationReach", "ScalarMode"):
         getattr(scene.mapper, f"Set{setter}")(0)
     scene.mapper.SetMaskInput(None)
-    scene.mapper.UseDepthPassOff()
-    scene.mapper.ComputeNormalFromOpacityOff()
     scene.actor.SetCoordinateSystemToWorld()
     np.testing.assert_array_equal(scene.picture(), before)

@@ -14,7 +14,7 @@ from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkVolumeProperty
 
 CAMERA = pvdi.Camera((0, -6, 2), (0, 0, 0), (0, 0, 1))
 SIZE = (24, 18)
-KEPT = {"value_range": (30, 220), "importance": [1.0, 2.0]}
+KEPT = {"value_range": (30, 220)}
 
 
 def source():

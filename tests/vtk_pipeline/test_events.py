@@ -95,13 +95,6 @@ def moved():
     return made
 
 
-def silent():
-    image = image_of(values())
-    image.SetSpacing(0.5, 1, 2)
-    image.SetOrigin(7, 8, 9)
-    return Maker(image, silent=True)
-
-
 def produced():
     image, made = image_of(values()), vtkTrivialProducer()
     image.SetOrigin(7, 8, 9)
@@ -109,7 +102,7 @@ def produced():
     return made
 
 
-FIRST = [splatter, part, moved, silent, produced]
+FIRST = [splatter, part, moved, produced]
 
 
 @event("bounds are asked before the first frame")

@@ -15,6 +15,7 @@ from plugin_scenes import (
 )
 from skimage.metrics import structural_similarity
 
+from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkMultiVolume,
     vtkOpenGLGPUVolumeRayCastMapper,
@@ -88,7 +89,7 @@ def eye_in_both(plotter, actors):
 @pytest.mark.filterwarnings("ignore:coverage='bounds'")
 @pytest.mark.parametrize(
     "scene",
-    [meshes, one_cropped, one_inverted, eye_in_both],
+    [meshes, one_cropped, eye_in_both],
     ids=lambda scene: scene.__name__,
 )
 def test_the_order_of_adding_changes_nothing(scene):
@@ -96,6 +97,11 @@ def test_the_order_of_adding_changes_nothing(scene):
     assert np.array_equal(first, second)
     alone = draw((1,), lambda plotter, actors: scene(plotter, {0: None, **actors}))
     assert np.abs(first - alone).max() > 40  # the other one is there
+
+
+def test_another_window_or_level_of_one_is_refused():
+    with pytest.warns(VDIWarning, match="overlap .*SetFinalColorWindow"):
+        draw((0, 1), one_inverted)
 
 
 def multi_volume():

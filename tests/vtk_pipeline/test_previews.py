@@ -16,8 +16,6 @@ from watched_windows import (
 )
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.quality.costs import rise
-from pyvista_vdi.quality.rate import HEADROOM
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtk_to_numpy,
     vtkGenericRenderWindowInteractor,
@@ -160,7 +158,6 @@ def test_a_style_starts_and_ends_an_interaction(coarsest):
 def test_vtks_switches_turn_previews_off_and_bound_them(plotter, coarsest):
     actor = watched(plotter)
     mapper = actor.mapper
-    assert mapper.GetInteractiveUpdateRate() == 1.0
     assert mapper.GetAutoAdjustSampleDistances()
 
     def share():
@@ -171,9 +168,6 @@ def test_vtks_switches_turn_previews_off_and_bound_them(plotter, coarsest):
     mapper.AutoAdjustSampleDistancesOff()
     assert share() == 1.0
     mapper.AutoAdjustSampleDistancesOn()
-    mapper.SetInteractiveUpdateRate(MOVING + 1)
-    assert share() == 1.0
-    mapper.SetInteractiveUpdateRate(MOVING)
     mapper.SetMaximumImageSampleDistance(2.0)
     assert share() == pytest.approx(0.25, abs=0.01)
     mapper.SetMaximumImageSampleDistance(10.0)
@@ -183,16 +177,3 @@ def test_vtks_switches_turn_previews_off_and_bound_them(plotter, coarsest):
     mapper.SetTargetFrameRate(None)
     assert mapper.GetTargetFrameRate() is None
     assert share() < 0.05
-
-
-def test_frames_keep_the_rate_where_rays_get_dearer_as_views_turn_away(plotter, counted):
-    """The typical rise is expected beforehand, not learned from frames that are late."""
-    actor = watched(plotter, target_fps=240.0 / HEADROOM)
-    frame(plotter)
-    rates = []
-    for _ in range(20):
-        counted.dear = 0.2 * rise(actor.status.angle + 2)
-        began = counted.now
-        turned(plotter, 2, MOVING)
-        rates.append(1 / (counted.now - began))
-    assert min(rates) > 240 / 1.2, rates

@@ -23,14 +23,14 @@ from watched_windows import (
 )
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import VDIWarning
 
 pytestmark = pytest.mark.gl
 
 
-def beyond(degrees):
-    """A policy that wants a VDI of each view so far from the last one's."""
-    return lambda status: status.angle > degrees
+def asking(plotter, actor):
+    """Ask for a VDI of the view, in the background."""
+    actor.mapper.GetSource().SetCamera(plotter.camera)
+    frame(plotter)
 
 
 def test_auto_estimates_when_the_view_has_moved_and_regenerates_below_the_bound(
@@ -47,7 +47,7 @@ def test_auto_estimates_when_the_view_has_moved_and_regenerates_below_the_bound(
     frames(plotter, 3)
     assert no_estimates.asked == 1
     assert actor.vdi is old
-    assert (actor.status.progress, threads("estimate")) == (None, [])
+    assert actor.status.progress is None
     no_estimates.ssim = 0.89
     plotter.camera.Azimuth(5)
     frames_until(plotter, lambda: actor.vdi is not old)
@@ -66,21 +66,12 @@ def test_auto_with_the_real_estimate(plotter):
     np.testing.assert_array_equal(frame(plotter), picture_of(actor.vdi, plotter))
 
 
-def test_what_cannot_be_made_any_more_is_said_and_the_old_stays(plotter):
-    actor = watched(plotter)
-    before = frame(plotter)
-    actor.prop.SetTransferFunctionModeTo2D()
-    with pytest.warns(VDIWarning, match="cannot be made anew: UnsupportedError: .*2D transfer"):
-        frame(plotter)
-    np.testing.assert_array_equal(frame(plotter), before)
-
-
 def in_the_middle():
     """A plotter for which a VDI is being made."""
     plotter = pv.Plotter(window_size=WINDOW)
-    actor = watched(plotter, regenerate=beyond(10))
-    actor.show_status(plotter)
+    actor = watched(plotter)
     turned(plotter, 30)
+    asking(plotter, actor)
     assert actor.status.progress == 0.0
     assert len(threads()) == 1
     return plotter
@@ -102,9 +93,9 @@ def test_forgetting_a_scene_in_the_middle_leaves_no_thread(gate, no_leaks):
 
 def test_no_leaks_of_a_watched_scene(no_leaks):
     plotter = pv.Plotter(window_size=WINDOW)
-    actor = watched(plotter, regenerate=beyond(10))
-    actor.show_status(plotter)
+    actor = watched(plotter)
     turned(plotter, 30, MOVING)
+    asking(plotter, actor)
     frames_until(plotter, lambda: actor.status.generation == 2)
     plotter.screenshot()
     plotter.close()

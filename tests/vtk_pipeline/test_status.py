@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from plugin_scenes import LOOKS, soft_ball
-from watched_windows import MOVING, STILL, frame, turned, watched
-
-import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError
+from watched_windows import frame
 
 pytestmark = pytest.mark.gl
 
@@ -36,27 +32,3 @@ def test_status_from_before_the_first_frame_on(plotter, gate, coarsest):
     assert "0° from the generating view, VDI no. 1, making the next: 0%" in text
     with pytest.raises(AttributeError):
         status.mode = "preview"
-
-
-def test_corner_text_is_of_the_frame_that_shows_it(plotter, coarsest):
-    plotter.window_size = (241, 203)
-    actor = watched(plotter)
-    annotation = actor.show_status()
-    turned(plotter, 20, MOVING)
-    texts, pictures = [], []
-    for rate in (MOVING, STILL):
-        pictures.append(frame(plotter, rate)[:60, :120])
-        texts.append(annotation.GetText(2))
-    assert texts[0].startswith("preview: 6%")
-    assert texts[1].startswith("full: 100%")
-    assert "20° from" in texts[1]
-    assert np.abs(pictures[0] - pictures[1]).max() > 100
-    other = actor.show_status(corner="lower right")
-    plotter.render()
-    assert other.GetText(1).startswith("full")
-    with pytest.raises(InvalidArgumentError, match="corner must be one of .*got 'middle'"):
-        actor.show_status(corner="middle")
-    lone = pvdi.VDIActor()
-    lone.SetMapper(pvdi.VDIMapper())
-    with pytest.raises(InvalidArgumentError, match="nothing shows this actor yet"):
-        lone.show_status()

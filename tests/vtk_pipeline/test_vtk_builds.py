@@ -7,7 +7,7 @@ import pyvista as pv
 from fresh_python import run_python
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import MissingDependencyError, UnsupportedError
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.vtk_pipeline import (
     VDIWriter,
     transfer_function_from_property,
@@ -47,25 +47,6 @@ def test_the_build_is_what_pyvista_would_choose(tmp_path, expected, chosen, pyvi
     assert output_of(head + ASK, PYVISTA_VTK_BACKEND=chosen) == [expected]
     head += "sys.modules['paraview'] = sys\n"
     assert output_of(head + ASK, PYVISTA_VTK_BACKEND=chosen) == ["vtkmodules"]
-
-
-@pytest.mark.parametrize(
-    ("build", "text", "message"),
-    [
-        (
-            "vtkmodules",
-            "libGL.so.1: cannot open shared object file",
-            "the system library libGL.so.1 is missing: on Debian and Ubuntu apt install libgl1",
-        ),
-        ("vtkmodules", "No module named 'vtkmodules'", r'pip install "pyvista-vdi\[plot\]"'),
-    ],
-)
-def test_a_vtk_that_cannot_be_loaded_names_the_package(build, text, message, monkeypatch):
-    monkeypatch.setattr(vtk, "BACKEND", build)
-    error = vtk.explain_import_error(ImportError(text))
-    assert isinstance(error, MissingDependencyError)
-    with pytest.raises(MissingDependencyError, match=message):
-        raise error
 
 
 class vtkObjectBase:  # noqa: N801 - what stands for the base class of another build

@@ -25,7 +25,7 @@ from watched_windows import (
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import DeviceError, VDIWarning
 from pyvista_vdi.quality import background
-from pyvista_vdi.vtk_pipeline.drawing import driver
+from pyvista_vdi.vtk_pipeline.drawing import planner
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
@@ -62,7 +62,7 @@ NEVER_KEPT = 1e6
 def test_first(plotter, gate):
     actor = auto(plotter)
     assert (actor.status.drawn, actor.status.generation) == ("volume", 0)
-    finish("stand-in")
+    finish()
     frames(plotter, 2)
     assert actor.status.progress is None, "its own frames keep the rate"
     actor.mapper.SetTargetFrameRate(NEVER_KEPT)
@@ -77,8 +77,10 @@ def test_first(plotter, gate):
 
 
 def test_ready(plotter, gate):
-    actor = watched(plotter, regenerate=lambda status: status.angle > 20)
-    before = turned(plotter, 40)
+    actor = watched(plotter)
+    turned(plotter, 40)
+    actor.mapper.GetSource().SetCamera(plotter.camera)
+    before = frame(plotter)
     assert (actor.status.progress, actor.status.generation) == (0.0, 1)
     gate.set()
     *earlier, last = frames_until(plotter, lambda: actor.status.generation == 2)
@@ -98,7 +100,7 @@ def test_moves(plotter, coarsest):
 def test_no_vdi_is_made_while_a_hand_moves_and_what_serves_goes_on_at_rest(
     plotter, gate, no_estimates, monkeypatch
 ):
-    monkeypatch.setattr(driver, "SETTLED", LONG)  # however long a frame takes
+    monkeypatch.setattr(planner, "SETTLED", LONG)  # however long a frame takes
     actor = auto(plotter, draw="vdi")
     no_estimates.ssim = 0.5
     turned(plotter, 60)
@@ -244,7 +246,7 @@ def test_closed(gate):
     frames_until(plotter, lambda: actor.status.progress == 0.0)
     plotter.close()
     assert actor.status.progress is None
-    assert not [name for name in ("generation", "estimate", "stand-in") if threads(name)]
+    assert not threads()
 
 
 def test_again(plotter):

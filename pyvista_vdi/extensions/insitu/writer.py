@@ -27,9 +27,8 @@ from pyvista_vdi.extensions.series.writer import SeriesWriter
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.model.arguments import names_of, records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_range, as_whole, not_taken, three_wholes
+from pyvista_vdi.model.checks import as_whole, not_taken, three_wholes
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.deferred import importance_points
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -168,8 +167,6 @@ class InSitu:
         self._looks = Classification.composited(looks, "InSitu", names_of(*_RECORDS))
         if self._deferral.deferred:
             self._looks.require_no_look()
-            ends = as_range(self._deferral.value_range)  # what cannot be is refused before the run
-            importance_points(self._deferral.importance, ends)
             self._function = unclassified(self._looks.interpolation)
 
     def __call__(self, values: NDArray[Any], first: Sequence[int], at: float) -> None:

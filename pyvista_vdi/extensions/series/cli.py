@@ -6,6 +6,7 @@ import argparse
 import math
 import sys
 from collections.abc import Sequence
+from contextlib import closing
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -18,7 +19,6 @@ from pyvista_vdi.cli.inputs import (
     classification,
     file_options,
     given,
-    measuring,
     refuse,
 )
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
@@ -32,6 +32,7 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
+from pyvista_vdi.plotting.progress import DelayedBar
 
 #: Options that are for volumes alone.
 _OF_VOLUMES = (*OF_VOLUMES, *LOOK, *PLACE, "view_angle", "sample_distance", "memory_limit")
@@ -65,7 +66,7 @@ def series(options: argparse.Namespace) -> int:
     Classification.composited(look, "series")
     how = look | given(options, GenerationOptions, Deferral)
     check_writable(with_suffix(Path(options.output), (".vdis",), "a series"))
-    with measuring("writing a series") as bar:
+    with closing(DelayedBar(label="writing a series")) as bar:
         with naming(steps[0].name):
             first = steps[0].read()
         if not of_vdis:

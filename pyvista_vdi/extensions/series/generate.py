@@ -150,11 +150,7 @@ def _steps(
 ) -> tuple[Iterable[Any], tuple[float, ...] | None]:
     """Return the steps' volumes, and their times where they are known."""
     own: Iterable[float] | None = None
-    if hasattr(volumes, "GetOutputPort") or hasattr(volumes, "time_values"):
-        from pyvista_vdi.vtk_pipeline.filters.temporal import steps_and_times
-
-        volumes, own = steps_and_times(volumes)
-    elif isinstance(volumes, StoredVolume) and len(volumes.store.times) > 1:
+    if isinstance(volumes, StoredVolume) and len(volumes.store.times) > 1:
         own = volumes.store.times
         volumes = Called(volumes.at_time, range(len(volumes.store.times)))
     times = own if times is None else times

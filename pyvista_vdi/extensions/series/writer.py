@@ -239,5 +239,5 @@ def _locked(folder: Path) -> IO[bytes]:
 def _view_and_look(vdi: Any) -> dict[str, Any]:
     """Return what is the same in all steps of a series that is continued."""
     said = {n: vdi.metadata.get(n) for n in ("transfer_function", "lights", "ambient_occlusion")}
-    names = ("camera", "window_size", "value_range", "importance")
+    names = ("camera", "window_size", "value_range")
     return {n: getattr(vdi, n, None) for n in names} | json.loads(to_json(said))  # type: ignore[no-any-return]

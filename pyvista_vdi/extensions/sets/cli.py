@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import closing
 from pathlib import Path
 
 from pyvista_vdi.cli.generate import generating_view
-from pyvista_vdi.cli.inputs import classification, given, measuring, part, read_volume
+from pyvista_vdi.cli.inputs import classification, given, read_volume
 from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.extensions.sets.generate import generate_set
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
+from pyvista_vdi.plotting.progress import DelayedBar
 
 
 def generate(options: argparse.Namespace) -> int:
@@ -23,9 +25,9 @@ def generate(options: argparse.Namespace) -> int:
     asked = {n: getattr(options, n) for n in ("views", "half_angle", "lists", "device")}
     how |= {name: value for name, value in asked.items() if value is not None}
     how |= {"window_size": options.size, "camera": generating_view(options, volume), **look}
-    with measuring("generating a set") as bar:
-        vdi_set = generate_set(volume, progress=part(bar, 0.0, 0.9, "generating"), **how)
-        vdi_set.save(target, progress=part(bar, 0.9, 1.0, "writing"))
+    with closing(DelayedBar(label="generating a set")) as bar:
+        vdi_set = generate_set(volume, progress=bar, **how)
+        vdi_set.save(target, progress=bar)
     n_bytes = mebibytes(target.stat().st_size)
     print(f"{printable(options.output)}: {len(vdi_set)} VDIs, {n_bytes}")
     return 0
@@ -42,5 +44,5 @@ half_angle  DEGREES  from the camera's direction within which they are (default:
 lists       X        lists per pixel along an edge (default: 1)
 max_supersegments sample_distance memory_limit
 camera: the view that the volume fills; it tells distance, lens, up and a cone's axis
-table: occlusion:
+table: ambient_occlusion
 """

@@ -51,7 +51,7 @@ port=8765       PORT      0: one that is free
 token           TEXT      what the URL must carry (default: a random one)
 allow_host      NAME +    another name by which browsers may call this server
 lists=1280x720  WxH       most lists of a VDI
-table: occlusion:
+table: ambient_occlusion
 [limits]
 max_supersegments=8 sample_distance memory_limit
 """

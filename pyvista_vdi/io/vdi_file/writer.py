@@ -30,7 +30,7 @@ from pyvista_vdi.io.vdi_file.layout import (
     version_of,
 )
 from pyvista_vdi.model.packing import DEPTH_CODES, Packed8
-from pyvista_vdi.model.vdi import VDI, Lists, length_per_depth, with_arrays
+from pyvista_vdi.model.vdi import VDI, length_per_depth, with_arrays
 from pyvista_vdi.model.whole_file import whole_file
 
 #: The oldest time that ZIP knows; a real one would make equal VDIs differ.
@@ -38,7 +38,7 @@ _NO_TIME = (1980, 1, 1, 0, 0, 0)
 
 
 def write(
-    vdi: Lists,
+    vdi: Any,
     path: str | os.PathLike[str],
     *,
     compression: str = "lz4",

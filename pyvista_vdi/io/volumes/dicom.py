@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_external
 from pyvista_vdi.io.axes import to_world
-from pyvista_vdi.io.volumes.in_file import REMEDY, VolumeInFile, head_of, stack
+from pyvista_vdi.io.volumes.in_file import REMEDY, Lazy, VolumeInFile, head_of
 
 _APART = "put those that belong together into a folder of their own"
 #: Functional groups that say where a frame lies, how large its pixels are, what its values mean.
@@ -47,7 +47,7 @@ def dicom(path: Path) -> list[VolumeInFile]:
             except Exception as error:  # of ours, or of what decodes pixels
                 wrong.append(error)
     if not found:
-        none = f"{path} holds no slices of DICOM, TIFF or PNG, or one: give the folder of them all"
+        none = f"{path} holds no slices of DICOM, or one: give the folder of them all"
         raise wrong[-1] if wrong else InvalidVolumeError(none)
     if wrong:
         left_out = f"{len(wrong)} files or series in the folder {path} are left out"
@@ -101,8 +101,6 @@ def _slices(file: Path) -> list[Any]:
 
 def _volume(path: Path, slices: list[Any], name: str) -> VolumeInFile:
     """Return a series in the order of its places."""
-    from pydicom.pixels import pixel_array
-
     slices.sort(key=lambda one: (one.header.get("InstanceNumber") or 0, one.file.name, one.frame))
     first, what = slices[0], f"slices in {path}"
     if first.header.get("SamplesPerPixel", 1) != 1:
@@ -110,7 +108,6 @@ def _volume(path: Path, slices: list[Any], name: str) -> VolumeInFile:
     rows, columns = first.spacing if len(first.spacing) and first.spacing.min() > 0 else (1.0, 1.0)
     if not len(first.spacing):
         warn_external(f"{what} do not say how large pixels are, and 1 mm is taken: give spacing=")
-    decoded = lru_cache(maxsize=1)(pixel_array)  # once for all frames of a file
     if any(len(one.position) != 3 or len(one.turn) != 6 for one in slices):
         raise InvalidVolumeError(
             f"{what} do not say where they lie or how they are turned: {REMEDY}"
@@ -134,9 +131,38 @@ def _volume(path: Path, slices: list[Any], name: str) -> VolumeInFile:
     # The step is along the normal, unless a gantry was tilted
     step = (slices[-1].position - slices[0].position) / len(gaps)
     place = to_world(np.column_stack([along * columns, down * rows, step]), slices[0].position)
-    files = [one.file for one in slices]
-    array = stack(files, lambda i: _values(slices[i], decoded), mixed=True)
-    return VolumeInFile(array, "zyx", place, name, "mm")
+    return VolumeInFile(_stack(slices), "zyx", place, name, "mm")
+
+
+def _stack(slices: list[Any]) -> Lazy:
+    """Return slices of one size along z, of a type that holds the values of all."""
+    from pydicom.pixels import pixel_array
+
+    decoded = lru_cache(maxsize=1)(pixel_array)  # once for all frames of a file
+
+    def one(i: int) -> NDArray[Any]:
+        try:
+            return _values(slices[i], decoded)
+        except Exception as error:  # of whatever decodes it
+            why = f"({' '.join(str(error).split())}): write it anew, uncompressed"
+            raise InvalidVolumeError(f"{slices[i].file} cannot be read as a slice {why}") from error
+
+    first = one(0)
+
+    def read_all() -> NDArray[Any]:
+        array = np.empty((len(slices), *first.shape), first.dtype)
+        for i in range(len(slices)):
+            values = one(i)
+            if values.shape != first.shape:
+                raise InvalidVolumeError(
+                    f"{slices[i].file} has {values.shape} pixels, and {slices[0].file} "
+                    f"{first.shape}: the slices of a volume have one size"
+                )
+            array = array.astype(np.promote_types(array.dtype, values.dtype), copy=False)
+            array[i] = values
+        return array
+
+    return Lazy((len(slices), *first.shape), first.dtype, read_all)
 
 
 def _values(one: Any, decoded: Callable[[Path], NDArray[Any]]) -> NDArray[Any]:

@@ -19,7 +19,7 @@ from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, warn_extern
 from pyvista_vdi.io.axes import one_unit, to_world
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.volumes.dicom import dicom
-from pyvista_vdi.io.volumes.in_file import REMEDY, Lazy, VolumeInFile, head_of, stack
+from pyvista_vdi.io.volumes.in_file import REMEDY, Lazy, VolumeInFile, head_of
 
 #: What OME and ImageJ call a micrometre.
 _MICRONS = ("um", "µm", "\\u00b5m", "micron", "microns")
@@ -162,49 +162,6 @@ def _described(opened: Any, number: int, page: Any) -> tuple[list[float], str, l
     return size, unit, names
 
 
-def natural_key(name: str) -> str:
-    """Return the sort key by which step 10 comes after step 9."""
-    return re.sub(r"\d+", lambda number: number[0].zfill(24), name)
-
-
-def slices_in(folder: Path) -> list[Path]:
-    """Return the pictures of slices in a folder, in natural order; none beside DICOM slices."""
-    files = [path for path in folder.iterdir() if path.is_file() and path.name[0] != "."]
-    found = [file for file in files if file.suffix.lower() in (".tif", ".tiff", ".png")]
-    if found and any(head_of(file)[128:132] == b"DICM" for file in {*files} - {*found}):
-        return []  # previews of a scan
-    return sorted(found, key=lambda file: natural_key(file.name.lower()))
-
-
-def pictures(path: Path) -> list[VolumeInFile]:
-    """Return the pictures in a folder as slices along z, by the types that they have.
-
-    The top row is the last along y, as VTK has pictures.
-    """
-    files = slices_in(path) if path.is_dir() else [path]
-    if len(files) < 2:
-        raise InvalidVolumeError(f"{path} holds one slice, and a volume needs two: give the folder")
-    numbers = [int(n[-1]) for file in files if (n := re.findall(r"\d+", file.stem))]
-    if len(numbers) == len(files) and len(set(np.diff(numbers))) > 1:
-        names = f"{files[0].name} to {files[-1].name}, {len(files)} files"
-        warn_external(f"slices in {path} are not evenly spaced ({names}): are some missing?")
-
-    def read(i: int) -> NDArray[Any]:
-        if files[i].suffix.lower() != ".png":
-            import tifffile
-
-            return np.asarray(tifffile.imread(files[i]))[::-1]
-        from PIL import Image
-
-        with Image.open(files[i]) as picture:
-            found = np.asarray(picture.convert("RGBA") if picture.mode == "P" else picture)
-            # Of 16 bits, as older versions have them
-            return found.astype(np.uint16 if picture.mode == "I" else found.dtype)[::-1]
-
-    slices = stack(files, read)
-    return [VolumeInFile(slices, "zyxs"[: len(slices.shape)])]
-
-
 def vtk(file: Path) -> list[VolumeInFile]:
     """Return what PyVista reads: this room knows neither VTK nor PyVista."""
     return registry.reader("")(file)  # type: ignore[no-any-return]
@@ -235,7 +192,6 @@ _TABLE: Any = (
     ("TIFF", ".tif .tiff .btf .tf8", tiff, "tifffile", "files", _TIFF),
     ("HDF5", ".h5 .hdf5 .he5 .hdf .nxs", None, "h5py", "files", (b"\x89HDF",)),
     ("NumPy", ".npy .npz", numpy, "numpy", "", (b"\x93NUMPY",)),
-    ("PNG slices", ".png", pictures, "PIL", ""),
     ("VTK", ".vti .vtr .vtm .vtk .pvti .vtkhdf", vtk, "pyvista", "plot", _VTK),
 )
 FORMATS = {
@@ -255,7 +211,7 @@ def format_of(path: str | os.PathLike[str]) -> VolumeFormat:
     if not os.path.exists(file):  # noqa: PTH110 - pathlib's raises for a name that is too long
         why = "does not exist: check the volume's path, or try pyvista_vdi.examples (--example)"
     elif file.is_dir():
-        return FORMATS["PNG slices" if slices_in(file) else "DICOM"]
+        return FORMATS["DICOM"]
     elif not file.is_file() or not file.stat().st_size:
         why = "cannot be read as a volume: it is empty, or no file"
     elif name.endswith((".vdi", ".exr", ".html")):

@@ -40,36 +40,6 @@ class Lazy:
         return self._read()[index]
 
 
-def stack(
-    files: Sequence[Path], read: Callable[[int], NDArray[Any]], *, mixed: bool = False
-) -> Lazy:
-    """Return slices of one size, read by number, along z; of one type unless ``mixed``."""
-
-    def one(i: int) -> NDArray[Any]:
-        try:
-            return read(i)
-        except Exception as error:  # each format has readers, and exceptions, of its own
-            why = f"({' '.join(str(error).split())}): write it anew, uncompressed"
-            raise InvalidVolumeError(f"{files[i]} cannot be read as a slice {why}") from error
-
-    first = one(0)
-
-    def read_all() -> NDArray[Any]:
-        array = np.empty((len(files), *first.shape), first.dtype)
-        for i, file in enumerate(files):
-            values = one(i)
-            if values.shape != first.shape or (values.dtype != first.dtype and not mixed):
-                raise InvalidVolumeError(
-                    f"{file} has {values.shape} pixels of type {values.dtype}, and {files[0]} "
-                    f"{first.shape} of {first.dtype}: the slices of a volume have one size and type"
-                )
-            array = array.astype(np.promote_types(array.dtype, values.dtype), copy=False)
-            array[i] = values
-        return array
-
-    return Lazy((len(files), *first.shape), first.dtype, read_all)
-
-
 @dataclass(frozen=True, eq=False)
 class VolumeInFile:
     """A volume in a file, and what the file says of it.

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, warn_external
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.collection import RATE, VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refusing
-from pyvista_vdi.vtk_pipeline.drawing.screen import VDIShaderProperty, show_image
+from pyvista_vdi.vtk_pipeline.drawing.screen import place_image, show_image
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
-from pyvista_vdi.vtk_pipeline.vtk import vtkVolume
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkOpenGLShaderProperty,
+    vtkVolume,
+)
 
 
 @refusing(OF_ACTORS)
@@ -24,8 +26,9 @@ class VDIActorMethods:
 
     def _become_vdi_actor(self: Any) -> None:
         """Install a shader of its own."""
-        super().SetShaderProperty(VDIShaderProperty())  # type: ignore[misc]
+        super().SetShaderProperty(vtkOpenGLShaderProperty())  # type: ignore[misc]
         show_image(self)
+        place_image(self, 0, (0, 0), (1, 1))
 
     def SetMapper(self: Any, mapper: Any) -> None:
         """Set the mapper, which must be a :class:`VDIMapper` of its own.
@@ -53,6 +56,31 @@ class VDIActorMethods:
         shader.RemoveObservers("UserEvent")
         if mapper is not None:
             shader.AddObserver("UserEvent", lambda *_: mapper)
+
+    def SetProperty(self: Any, prop: Any) -> None:
+        """Set the volume property, from which the VDI is regenerated.
+
+        What is shared with a copy of this actor is not changed for the other.
+
+        Parameters
+        ----------
+        prop : vtkVolumeProperty
+            Changes to it are followed.
+
+        Raises
+        ------
+        UnsupportedError, InvalidArgumentError
+            If a VDI cannot honour it; the property before stays.
+        """
+        mapper = self.GetMapper()
+        source = None if mapper is None else mapper.GetSource()
+        if source is not None and prop is not source.GetVolumeProperty():
+            mapper.own_source("its property").SetVolumeProperty(prop)
+        elif mapper is not None and (shown := mapper.driver.input) is not None:
+            mine = shown.classified_by(prop)
+            if mine is not shown:
+                mapper.SetInputData(mine)
+        super().SetProperty(prop)  # type: ignore[misc]
 
     def ShallowCopy(self: Any, other: Any) -> None:
         """Show what another actor shows, by a copy of its mapper, which is of one actor.
@@ -86,8 +114,8 @@ class VDIActorMethods:
         It is of the view that the first picture had; before that, of the view that it would have
         now; where a camera was given, of that. Making it is waited for. ``None`` where the mapper
         has no input, or where nothing shows the actor and nobody has said a view. Another one that
-        is set is shown from the next frame on, and takes the place of what made the one before: a
-        volume, which is let go of.
+        is set, a series or a set is shown from the next frame on, and takes the place of what made
+        the one before: a volume, which is let go of.
 
         Raises
         ------
@@ -98,16 +126,8 @@ class VDIActorMethods:
         return None if mapper is None else mapper.driver.vdi_asked_for()  # type: ignore[no-any-return]
 
     @vdi.setter
-    def vdi(self: Any, vdi: VDI) -> None:
-        mapper = self._mapper_for(" that could show a VDI")
-        given: Any = vdi
-        if isinstance(given, DeferredVDI):
-            raise InvalidVDIError(
-                "a DeferredVDI has no colours yet: set actor.vdi = vdi.classified(cmap=..., "
-                "opacity=...), or add it by plotter.add_vdi(vdi, cmap=..., opacity=...), whose "
-                "look can be changed"
-            )
-        mapper.SetVDI(vdi)
+    def vdi(self: Any, vdi: VDI | VDICollection) -> None:
+        self._mapper().SetVDI(vdi)
 
     @property
     def deferred(self: Any) -> DeferredVDI | None:
@@ -120,28 +140,26 @@ class VDIActorMethods:
 
     @property
     def vdi_set(self: Any) -> VDICollection | None:
-        """The set of which the nearest VDI is shown; ``None`` where a single one or a volume is.
+        """The set of which the nearest VDI is shown; ``None`` where a single one or a volume is."""
+        return self._collection(times=False)
 
-        Another one that is set is shown from the next frame on.
-        """
+    def _collection(self: Any, *, times: bool) -> VDICollection | None:
         mapper = self.GetMapper()
-        return None if mapper is None else mapper.GetVDISet()
+        source = None if mapper is None else mapper.driver.input
+        shown = None if source is None else source.collection
+        return shown if shown is not None and (shown.times is not None) == times else None
 
-    @vdi_set.setter
-    def vdi_set(self: Any, vdi_set: VDICollection) -> None:
-        self._mapper_for(" that could show a set").SetVDISet(vdi_set)
-
-    def _mapper_for(self: Any, what: str) -> Any:
-        """Return the mapper; without one, say what there cannot be."""
+    def _mapper(self: Any) -> Any:
+        """Return the mapper; InvalidArgumentError without one."""
         mapper = self.GetMapper()
         if mapper is None:
-            raise InvalidArgumentError(f"this actor has no mapper{what}")
+            raise InvalidArgumentError("this actor has no mapper: set a VDIMapper (SetMapper)")
         return mapper
 
     @property
     def status(self: Any) -> VDIStatus:
         """How the VDI was drawn in the last frame, and what goes on behind it."""
-        mapper = self._mapper_for(", so there is no status of it")
+        mapper = self._mapper()
         return mapper.driver.status()  # type: ignore[no-any-return]
 
     @property
@@ -152,47 +170,7 @@ class VDIActorMethods:
 
     @opacity_multiplier.setter
     def opacity_multiplier(self: Any, multiplier: float) -> None:
-        self._mapper_for(" whose opacity could be set").SetOpacityMultiplier(multiplier)
-
-    @property
-    def transmittance_cutoff(self: Any) -> float:
-        """Light below which rays end: see :meth:`VDIMapper.SetTransmittanceCutoff`."""
-        mapper = self.GetMapper()
-        return TRANSMITTANCE_CUTOFF if mapper is None else mapper.GetTransmittanceCutoff()
-
-    @transmittance_cutoff.setter
-    def transmittance_cutoff(self: Any, cutoff: float) -> None:
-        self._mapper_for(" whose rays could be ended").SetTransmittanceCutoff(cutoff)
-
-    def show_status(self: Any, renderer: Any = None, corner: str = "upper left") -> Any:
-        """Show :attr:`status` as a text in a corner, written anew in each frame.
-
-        Parameters
-        ----------
-        renderer : vtkRenderer or pyvista.Plotter, optional
-            Where; by default the renderer that shows the actor.
-        corner : {"lower left", "lower right", "upper left", "upper right"}
-            Which corner.
-
-        Returns
-        -------
-        vtkCornerAnnotation
-            The text: it can be styled (``GetTextProperty()``), hidden and removed.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If there is no such corner, or no renderer shows the actor.
-        """
-        mapper = self.GetMapper()
-        if renderer is None and mapper is not None:
-            renderer = mapper.driver.renderer()
-        renderer = getattr(renderer, "renderer", renderer)  # a plotter's active one
-        if mapper is None or renderer is None:
-            raise InvalidArgumentError(
-                "nothing shows this actor yet: add it to a renderer first, or pass the renderer"
-            )
-        return mapper.driver.texts.add(renderer, corner)
+        self._mapper().SetOpacityMultiplier(multiplier)
 
     def pick(self: Any, x: float, y: float, *, renderer: Any = None) -> Pick | None:
         """Return the supersegment that is seen at a place of the window.
@@ -210,8 +188,8 @@ class VDIActorMethods:
         Pick or None
             The first supersegment that reaches the opacity set by
             ``GetMapper().SetPickingOpacity(...)``, and where the ray enters it, in world
-            coordinates. ``None`` where nothing of the VDI is hit, where something else that can
-            be picked is in front of the hit, and where the actor is invisible or not pickable.
+            coordinates. ``None`` where nothing of the VDI is hit, where something opaque hid the
+            hit in the last frame, and where the actor is invisible or not pickable.
 
         Raises
         ------
@@ -228,7 +206,7 @@ class VDIActorMethods:
         if renderer is not None:
             shown = [r for r in shown if r is getattr(renderer, "renderer", renderer)]
         there = [r for r in shown if r.IsInViewport(int(x), int(y))]
-        return mapper.driver.pick(self, there[0], x, y) if there else None
+        return mapper.driver.pick(there[0], x, y) if there else None
 
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
         """Generate the VDI anew, now.
@@ -282,20 +260,8 @@ class VDIActorMethods:
 
     @property
     def series(self: Any) -> VDICollection | None:
-        """The series that is shown; ``None`` where a single VDI or a volume is.
-
-        Another one that is set is shown from the next frame on, at the step nearest in time.
-        """
-        mapper = self.GetMapper()
-        return None if mapper is None else mapper.GetSeries()
-
-    @series.setter
-    def series(self: Any, series: VDICollection) -> None:
-        mapper = self._mapper_for(" that could show a series")
-        before = None if mapper.GetSeries() is None else self.time
-        mapper.SetSeries(series)
-        if before is not None:
-            self.time = before
+        """The series that is shown; ``None`` where a single VDI or a volume is."""
+        return self._collection(times=True)
 
     @property
     def time(self: Any) -> float:
@@ -379,7 +345,7 @@ class VDIActorMethods:
         self._player().pause()
 
     def _player(self: Any) -> Any:
-        shown = self._mapper_for(" that could show a series").driver.input
+        shown = self._mapper().driver.input
         if shown is None or shown.player is None:
             raise InvalidArgumentError(
                 "this actor shows no series, which alone has times: add one (plotter.add_vdi("
@@ -391,26 +357,10 @@ class VDIActorMethods:
 class VDIActor(VDIActorMethods, vtkVolume):
     """Shows a VDI in a VTK scene: ``renderer.AddVolume(actor)``.
 
-    Position, scale, user matrix, visibility and picking are those of a ``vtkVolume``. Its volume
-    property has no effect here: the classification is in the VDI (see
-    ``VDISource.SetVolumeProperty``). Other coordinate systems than the world, and changes to its
+    Position, scale, user matrix, visibility and picking are those of a ``vtkVolume``, and its
+    volume property is that of the source. Other coordinate systems than the world, and another
     shader, are refused by name.
     """
 
     def __init__(self) -> None:
         self._become_vdi_actor()
-
-    def SetProperty(self, prop: Any) -> None:
-        """Set the actor's volume property, which changes nothing, and warn if it is another one.
-
-        Another one than the source's, that is; with none of the source there is nothing to say.
-        """
-        super().SetProperty(prop)
-        mapper = self.GetMapper()
-        source = None if mapper is None else mapper.GetSource()
-        own = None if source is None else source.GetVolumeProperty()
-        if own is not None and own is not prop:
-            warn_external(
-                "VDIActor.SetProperty changes nothing: the VDI has the colours and opacities of "
-                "its source's property, which VDISource.SetVolumeProperty sets"
-            )

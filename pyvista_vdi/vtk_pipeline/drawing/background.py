@@ -1,14 +1,14 @@
-"""What is made in the background of a mapper's frames: VDIs, estimates, and the first volume.
+"""What is made in the background of a mapper's frames: one thing at a time, by one thread.
 
-The methods are for the thread that draws; the threads that work know nothing of VTK
+The methods are for the thread that draws; the thread that works knows nothing of VTK
 (:mod:`pyvista_vdi.quality.background`).
 """
 
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Literal
 
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
@@ -27,7 +27,7 @@ from pyvista_vdi.vtk_pipeline.filters.source import Request
 _TRIALS = 5
 
 
-class Estimators:
+class Estimator:
     """The estimator of the content that was judged last, which keeps the volume on the device."""
 
     def __init__(self) -> None:
@@ -51,91 +51,75 @@ class Estimators:
 
 
 class Background:
-    """The workers of a mapper.
+    """The worker of a mapper.
 
     Attributes
     ----------
+    kind : {"vdi", "estimate", "trial"} or None
+        What is being made, or waits to be taken.
     request : Request or None
-        What the VDI that is being made is made of.
-    estimating, preparing : bool
-        Whether an estimate, or the first volume, is being made.
+        What that is made of.
     """
 
     def __init__(self) -> None:
+        self.kind: Literal["vdi", "estimate", "trial"] | None = None
         self.request: Request | None = None
-        self._generation = BackgroundThread("pyvista-vdi generation")
-        self._estimation = BackgroundThread("pyvista-vdi estimate")
-        self._preparation = BackgroundThread("pyvista-vdi stand-in")
-        self._workers = (self._generation, self._estimation, self._preparation)
-        self._estimators = Estimators()
-        self._prepared = False
-        # The threads know the workers alone, so that this can be collected while they work
-        finalizer = weakref.finalize(self, _clear, self._workers)
-        finalizer.atexit = False  # the workers' own end waits for the threads as well
+        self._worker = BackgroundThread("pyvista-vdi generation")
+        # The thread knows the worker alone, so that this can be collected while it works
+        finalizer = weakref.finalize(self, self._worker.clear)
+        finalizer.atexit = False  # the worker's own end waits for the thread as well
 
     @property
     def progress(self) -> float | None:
         """Share done of the VDI that is being made, 0 to 1; ``None`` if none is."""
-        return None if self.request is None else self._generation.progress
+        return self._worker.progress if self.kind == "vdi" else None
 
-    @property
-    def estimating(self) -> bool:
-        """Whether an estimate is being made, or waits to be taken."""
-        return self._estimation.job is not None
-
-    @property
-    def preparing(self) -> bool:
-        """Whether the first volume is being drawn, or what it took waits to be taken."""
-        return self._preparation.job is not None
-
-    def finished(self) -> Iterator[tuple[str, Any]]:
-        """Yield what was finished since the last time: of what kind, and it or its error."""
-        for kind, worker in zip(("vdi", "estimate", "took"), self._workers, strict=True):
-            if worker.job is None:
-                continue
-            try:
-                made = worker.take()
-            except Exception as error:
-                made = error
-            if made is not None:
-                yield kind, made
+    def finished(self) -> tuple[str, Any, Request] | None:
+        """Return what was finished: of what kind, it or its error, and what it was made of."""
+        if self.kind is None or self.request is None:
+            return None
+        try:
+            made = self._worker.take()
+        except Exception as error:
+            made = error
+        if made is None:
+            return None
+        done, self.kind, self.request = (self.kind, made, self.request), None, None
+        return done
 
     def pause(self, seconds: float) -> None:
         """Leave the machine to a hand that moves, for so long from now on; 0: work on."""
-        for worker in self._workers:
-            worker.pause(seconds)
+        self._worker.pause(seconds)
+
+    def drop(self) -> None:
+        """Cancel what is being made."""
+        self._worker.clear()
+        self.kind = self.request = None
+
+    def close(self) -> None:
+        """Cancel it, and leave no thread."""
+        self.drop()
+        self._worker.join()
 
     def generate(self, request: Request) -> None:
-        """Make a VDI, in place of the one that is being made."""
-        self.request = request
-        self._generation.put(vdi_job(request.generation, request.target))
+        """Make a VDI, in place of what is being made."""
+        self._put("vdi", request, vdi_job(request.generation, request.target))
 
-    def drop_vdi(self) -> None:
-        """Cancel the VDI that is being made."""
-        self._generation.clear()
-        self.request = None
-
-    def estimate(self, number: int, vdi: VDI, request: Request, view: View, shown: Any) -> None:
-        """Estimate the error of a VDI in a view, in place of the estimate before."""
-        estimators = self._estimators
+    def estimate(
+        self, by: Estimator, number: int, vdi: VDI, request: Request, view: View, shown: Any
+    ) -> None:
+        """ViewEstimate the error of a VDI in a view."""
 
         def judge(runtime: Runtime, _: Callable[[float], None]) -> ViewEstimate:
             with runtime.aside():  # loads SciPy, the first time: a quarter of a second
                 from skimage.metrics import structural_similarity  # noqa: F401
-            error = estimators.estimate(request, runtime, vdi, view, shown)
+            error = by.estimate(request, runtime, vdi, view, shown)
             return ViewEstimate(number, view, error.ssim, error.contrast)
 
-        self._estimation.put(Job(judge, request.device))
+        self._put("estimate", request, Job(judge, request.device))
 
-    def drop_estimate(self) -> None:
-        """Cancel the estimate that is being made."""
-        self._estimation.clear()
-
-    def prepare(self, request: Request) -> None:
-        """Draw the volume in vain, once: all is compiled then, and it is known what a ray takes."""
-        if self._prepared:
-            return
-        self._prepared = True
+    def try_volume(self, request: Request) -> None:
+        """Draw the volume in vain: all is compiled then, and it is known what a ray takes."""
 
         def draw(runtime: Runtime, _: Callable[[float], None]) -> tuple[float, float]:
             camera, volume = request.screen.camera, VolumePicture(request)
@@ -149,23 +133,8 @@ class Background:
                 taken.append(runtime.clock() - began)
             return trial.covered, min(taken)
 
-        self._preparation.put(Job(draw, request.device))
+        self._put("trial", request, Job(draw, request.device))
 
-    def forget_volume(self) -> None:
-        """Drop volumes on the device."""
-        self._estimators = Estimators()
-        self._prepared = False
-
-    def close(self) -> None:
-        """Cancel everything, and leave no thread."""
-        for worker in self._workers:
-            worker.clear()
-        for worker in self._workers:
-            worker.join()
-        self.request = None
-        self.forget_volume()
-
-
-def _clear(workers: tuple[BackgroundThread, ...]) -> None:
-    for worker in workers:
-        worker.clear()
+    def _put(self, kind: Any, request: Request, job: Job) -> None:
+        self.kind, self.request = kind, request
+        self._worker.put(job)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import aligned_empty
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.coverage import bounds_corners
@@ -20,28 +19,10 @@ from pyvista_vdi.quality.costs import RenderMode, rise
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, renderer_view
 from pyvista_vdi.vtk_pipeline.interaction.window import Window
-from pyvista_vdi.vtk_pipeline.vtk import (
-    VTK_FLOAT,
-    vtk_to_numpy,
-    vtkFloatArray,
-    vtkPixelBufferObject,
-    vtkTextureObject,
-)
 
 Matrix = NDArray[np.float64]
 Image = NDArray[np.float32]
-
-#: Left, bottom, right and top in pixels of the viewport; right and top are outside.
-Area = tuple[int, int, int, int]
-
-#: Images, pictures and readings kept: two eyes, and two more for other renderers or a picking pass.
-KEPT = 4
-
-#: Pixels whose depth is converted at a time.
-_BLOCK = 16384
-
 _GL_VIEWPORT = 0x0BA2
-_GL_DRAW_FRAMEBUFFER_BINDING = 0x8CA6
 
 #: Near and far planes further outside the bounds than this share of their depth cut nothing.
 _PLANE_SLACK = 1e-9
@@ -82,9 +63,20 @@ class Frame:
     depth: Image | None = None  # view depth at which rays end, float32 (H, W), top row first
 
     @classmethod
-    def current(cls, renderer: Any, actor: Any, mapper: Any, matrix: Matrix | None = None) -> Frame:
-        """Read the frame that ``renderer`` is drawing; ``matrix`` is where an actor stands."""
-        (x, y), (width, height) = viewport(renderer)
+    def current(
+        cls,
+        renderer: Any,
+        actor: Any,
+        mapper: Any,
+        matrix: Matrix | None = None,
+        *,
+        drawing: bool = True,
+    ) -> Frame:
+        """Read the frame that ``renderer`` is drawing, or between two would draw.
+
+        ``matrix`` is where an actor stands, (4, 4).
+        """
+        (x, y), (width, height) = viewport(renderer) if drawing else tiled(renderer)
         vtk_camera = renderer.GetActiveCamera()
         aspect = renderer.GetTiledAspectRatio()
         # Not GetCompositeProjectionTransformMatrix: that one turns stereo off
@@ -109,14 +101,9 @@ class Frame:
         return cls(size, (0, 0), camera, np.eye(4), np.eye(4)[2:], full_size=size, bounds=bounds)
 
     @property
-    def driver(self) -> Any:
-        """What draws the VDI."""
-        return self.mapper.driver
-
-    @property
     def window(self) -> Window:
         """The window that it is a frame of."""
-        return self.mapper.driver.window  # type: ignore[no-any-return]
+        return Window.of(self.renderer.GetRenderWindow())
 
     def showing(self, seen: Any, number: int) -> Frame:
         """Return the frame of this VDI, or volume, with all that its mapper says of its looks."""
@@ -137,7 +124,7 @@ class Frame:
     @property
     def key(self) -> Any:
         """What its image is known by, but for the depth; the quality is in it as the two sizes."""
-        of = (self.camera, self.size, self.full_size, self.options)
+        of = (self.way, self.number, self.camera, self.size, self.full_size, self.options)
         return (*of, self.lit_from, self.blend)
 
     @property
@@ -244,69 +231,6 @@ class Frame:
         depth = -(p3 - n * q3) / (n * q2 - p2)
         return np.where(z >= 1.0, np.inf, depth) if background else depth
 
-    def window_depth(self, depth: NDArray[Any]) -> Image:
-        """Convert view depth to window depth, as :meth:`view_depth` back; infinity stays."""
-        (p2, p3), (q2, q3) = self.projection[:, 2:]
-        there = np.isfinite(depth)
-        z = -np.where(there, depth, 1.0).astype(np.float64)
-        n = (z * p2 + p3) / (z * q2 + q3)
-        return np.where(there, (n + 1.0) / 2.0, np.inf).astype(np.float32)
-
-    def opaque_z(self, area: Area) -> Image:
-        """Read the window depth of what has been drawn in an area: (h, w), bottom row first."""
-        window = self.renderer.GetRenderWindow()
-        bound = [0]
-        window.GetState().vtkglGetIntegerv(_GL_DRAW_FRAMEBUFFER_BINDING, bound)
-        left, bottom, right, top = area
-        corner = (self.origin[0] + left, self.origin[1] + bottom)
-        size = (right - left, top - bottom)
-        own = bound[0] == window.GetRenderFramebuffer().GetFBOIndex()
-        return (_window_depth if own else _framebuffer_depth)(window, corner, size)
-
-    def depth_image(self, z: Image, area: Area) -> Image | None:
-        """Return the view depth of what :meth:`opaque_z` has read, float32 (H, W), top row first.
-
-        World units; infinite where nothing is. ``None`` if nothing is anywhere.
-        """
-        if z.min() >= 1.0:
-            return None
-        left, bottom, right, top = area
-        depth = aligned_empty(self.size[::-1], np.float32)
-        depth.fill(np.inf)
-        there = depth[self.size[1] - top : self.size[1] - bottom, left:right]
-        rows = max(1, _BLOCK // (right - left))
-        for first in range(0, top - bottom, rows):  # so that what is in between stays in the cache
-            there[first : first + rows] = self.view_depth(z[::-1][first : first + rows])
-        return depth
-
-
-def _window_depth(window: Any, corner: tuple[int, int], size: tuple[int, int]) -> Image:
-    (x, y), (width, height) = corner, size
-    values = vtkFloatArray()
-    window.GetZbufferData(x, y, x + width - 1, y + height - 1, values)
-    return vtk_to_numpy(values).reshape(height, width)
-
-
-def _framebuffer_depth(window: Any, corner: tuple[int, int], size: tuple[int, int]) -> Image:
-    """Copy the depth of a render pass's own framebuffer (SSAA, EDL, blur ...)."""
-    width, height = size
-    texture = vtkTextureObject()
-    texture.SetContext(window)
-    texture.AllocateDepth(width, height, vtkTextureObject.Float32)
-    samples = window.GetMultiSamples()
-    window.SetMultiSamples(0)  # or the copy resolves the window's framebuffer instead
-    try:
-        texture.CopyFromFrameBuffer(*corner, 0, 0, width, height)
-    finally:
-        window.SetMultiSamples(samples)
-    pixels: vtkPixelBufferObject = texture.Download()
-    z = np.empty(width * height, dtype=np.float32)
-    pixels.Download2D(VTK_FLOAT, z, [width, height], 1, [0, 0])
-    pixels.ReleaseMemory()
-    pixels.UnBind()  # it binds itself to be released, and would catch VTK's next glReadPixels
-    texture.ReleaseGraphicsResources(window)
-    return z.reshape(height, width)
-
 
 def consumers(prop: Any) -> list[Any]:
     """Return the renderers that show a prop, the assemblies that it is a part of, and theirs."""
@@ -326,6 +250,13 @@ def viewport(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:
     renderer.GetRenderWindow().GetState().vtkglGetIntegerv(_GL_VIEWPORT, values)
     x, y, width, height = values
     return (x, y), (width, height)
+
+
+def tiled(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return lower left corner and size of what a renderer fills of its window, pixels."""
+    width, height, x, y = [0], [0], [0], [0]
+    renderer.GetTiledSizeAndOrigin(width, height, x, y)
+    return (x[0], y[0]), (width[0], height[0])
 
 
 def sampled(depth: Image, size: tuple[int, int]) -> Image:

@@ -1,10 +1,10 @@
-"""The images of a mapper's last frames, and the raycast of another one: of a VDI or its volume."""
+"""The raycast of a frame's image: of a VDI, or of its volume."""
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,8 @@ from pyvista_vdi.raycasting.multi_vdi import blended
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import picture_room, raycast_medium, raycast_volume
-from pyvista_vdi.vtk_pipeline.drawing.frame import KEPT, Frame, Image
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Image
 from pyvista_vdi.vtk_pipeline.filters.source import Request
-
-T = TypeVar("T")
 
 _numbers = itertools.count()
 
@@ -92,18 +90,18 @@ class VolumePicture:
         return raycast_medium(self._medium, frame, lit_from=lit_from or self.request.generating[0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drawn:
     """An image that was raycast, kept without what VTK has.
 
     ``pixels`` is the memory that it begins, 1D: another image may be raycast into it when this one
-    is kept no longer.
+    is shown no longer.
     """
 
     image: Image  # premultiplied RGBA, (H, W, 4), top row first
     full_size: tuple[int, int] | None = None  # the viewport's; None before the first image
+    key: Any = None  # all that it depends on, but for the depth
     depth: Image | None = None  # where its rays ended
-    number: int | None = None  # by which an upload is known
     joint: bool = False  # a part of a picture that other actors show the rest of
     way: RenderMode = "vdi"  # what was raycast
     pixels: Image | None = None
@@ -118,77 +116,32 @@ class Drawn:
         """Whether its pixels are interpolated: not where the neighbours are another actor's."""
         return self.preview and not self.joint
 
+    def shows(self, frame: Frame) -> bool:
+        """Whether this is the image of exactly this frame."""
+        if self.key != frame.key:
+            return False
+        a, b = self.depth, frame.depth
+        return a is b if a is None or b is None else np.array_equal(a, b)
+
 
 #: What a frame shows of which nothing can be drawn.
 NOTHING = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
 
 
-class Images:
-    """Images that are kept, by what they are of, and the memory of one that is kept no longer."""
-
-    def __init__(self) -> None:
-        self._kept: Recent[Drawn] = Recent()
-        self._of: tuple[str, int] | None = None  # which VDI, or volume
-        self._free: Image | None = None  # shown by no frame, not even the last
-        self._raycasts = 0
-
-    def get(self, frame: Frame) -> Drawn | None:
-        """Return the image of exactly this frame, if there is one."""
-        if self._of != (frame.way, frame.number):
-            self._of = (frame.way, frame.number)
-            self._kept.clear()
-        drawn = self._kept.get(frame.key)
-        return drawn if drawn is not None and same_depth(drawn.depth, frame.depth) else None
-
-    def raycast(self, frame: Frame, device: object) -> Drawn:
-        """Return the image, and keep it; the memory of one that goes is for the next raycast."""
-        width, height = frame.size
-        # Fresh memory costs a page fault for every 4096 bytes that are written
-        pixels, self._free = self._free, None
-        if pixels is None or pixels.size < width * height * 4:
-            pixels = aligned_empty(width * height * 4, np.float32)
-        out = pixels[: height * width * 4].reshape(height, width, 4)
-        request = FrameRequest(frame.camera, frame.size, frame.options, frame.depth, device, out)
-        if frame.volume is not None:
-            image = frame.volume.picture(request, frame.lit_from)
-        elif frame.parts:
-            image = blended(frame.parts, request)
-        else:
-            assert frame.vdi is not None
-            image = render_vdi(frame.vdi, request)
-        self._raycasts += 1
-        of = (frame.full_size, frame.depth, self._raycasts)
-        drawn = Drawn(image, *of, way=frame.way, pixels=pixels)
-        gone = self._kept.keep(frame.key, drawn)
-        if gone is not None:
-            self._free = gone.pixels
-        return drawn
-
-    @property
-    def any(self) -> bool:
-        """Whether there are any."""
-        return bool(self._kept)
-
-    def clear(self) -> None:
-        """Drop all."""
-        self._kept.clear()
-        self._free = None
-
-
-class Recent(dict[Any, T]):
-    """What was kept last, by what it is known by."""
-
-    def keep(self, key: Any, value: T) -> T | None:
-        """Keep something as the newest, and return what is kept no longer in its place."""
-        gone = self.pop(key, None)
-        self[key] = value
-        if len(self) > KEPT:
-            gone = self.pop(next(iter(self)))
-        return gone
-
-
-def same_depth(a: Image | None, b: Image | None) -> bool:
-    """Whether rays end at the same depths; ``None`` where none end early."""
-    if a is b or a is None or b is None:
-        return a is b
-    return np.array_equal(a, b)
+def raycast(frame: Frame, device: object, pixels: Image | None) -> Drawn:
+    """Return the image of a frame, in memory that is given where that is large enough."""
+    width, height = frame.size
+    # Fresh memory costs a page fault for every 4096 bytes that are written
+    if pixels is None or pixels.size < width * height * 4:
+        pixels = aligned_empty(width * height * 4, np.float32)
+    out = pixels[: height * width * 4].reshape(height, width, 4)
+    request = FrameRequest(frame.camera, frame.size, frame.options, frame.depth, device, out)
+    if frame.volume is not None:
+        image = frame.volume.picture(request, frame.lit_from)
+    elif frame.parts:
+        image = blended(frame.parts, request)
+    else:
+        assert frame.vdi is not None
+        image = render_vdi(frame.vdi, request)
+    of = (frame.full_size, frame.key, frame.depth)
+    return Drawn(image, *of, way=frame.way, pixels=pixels)

@@ -1,4 +1,4 @@
-"""What of VTK's mapper, actor and shader a VDI has no place for: refused when it is called."""
+"""What of VTK's mapper and actor a VDI has no place for: refused when it is called."""
 
 from __future__ import annotations
 
@@ -17,60 +17,34 @@ _LIT = (
     "it lights a volume while it is drawn, and a VDI is lit when it is generated: use "
     "ambient_occlusion (VDISource.SetAmbientOcclusion), which darkens what is hidden"
 )
-_GRADIENT = (
-    "a VDI is shaded by the gradient of its scalars, and when it is generated: leave "
-    "ComputeNormalFromOpacity off"
-)
-_DEPTH = (
-    "a VDI has no depth image of VTK's: VDIActor.pick(x, y) returns the place that is seen at a "
-    "pixel"
-)
-_ISOSURFACES = (
-    "a VDI has no isosurfaces: draw them beside it (vtkContourFilter), or the volume by VTK's "
-    "mapper"
-)
-_STEP = (
-    "the step of a VDI is half the smallest spacing, or what SetSampleDistance says: call that in "
-    "its place"
-)
-_ONE_INPUT = "a VDIMapper draws one VDI: give each its own VDIMapper and VDIActor"
 
 #: Methods of VTK's GPU volume mapper. What turns a thing off, or to nothing, is accepted.
 OF_MAPPERS: Mapping[str, str] = {
-    "SetBlendModeToMaximumIntensity": _COMPOSITE,
-    "SetBlendModeToMinimumIntensity": _COMPOSITE,
-    "SetBlendModeToAverageIntensity": _COMPOSITE,
-    "SetBlendModeToAdditive": _COMPOSITE,
-    "SetBlendModeToIsoSurface": _COMPOSITE,
-    "SetBlendModeToSlice": _COMPOSITE,
+    **{
+        f"SetBlendModeTo{name}": _COMPOSITE
+        for name in (
+            *("MaximumIntensity", "MinimumIntensity", "AverageIntensity"),
+            *("Additive", "IsoSurface", "Slice"),
+        )
+    },
     "SetBlendMode": _COMPOSITE,  # composite blending is 0
     "SetGlobalIlluminationReach": _LIT,
     "SetVolumetricScatteringBlending": _LIT,
-    "SetComputeNormalFromOpacity": _GRADIENT,
-    "ComputeNormalFromOpacityOn": _GRADIENT,
     "SetMaskInput": "a VDI cannot be masked when it is drawn: set masked voxels to a transparent "
     "value, or hide them (AllocatePointGhostArray), before it is generated",
-    "SetUseDepthPass": _ISOSURFACES,
-    "UseDepthPassOn": _ISOSURFACES,
-    "SetClampDepthToBackface": _DEPTH,
-    "ClampDepthToBackfaceOn": _DEPTH,
-    "GetDepthImage": _DEPTH,
-    "GetDepthTexture": _DEPTH,
-    "SetLockSampleDistanceToInputSpacing": _STEP,
-    "LockSampleDistanceToInputSpacingOn": _STEP,
-    "CreateCanonicalView": "it draws VTK's own ray caster's picture: take one by "
-    "vtkWindowToImageFilter, or by pyvista_vdi.render",
-    "AddInputConnection": _ONE_INPUT,
-    "AddInputDataObject": _ONE_INPUT,
+    **dict.fromkeys(
+        (
+            *("SetScalarMode", "SetScalarModeToUsePointFieldData", "SetScalarModeToUseCellData"),
+            *("SetScalarModeToUseCellFieldData", "SelectScalarArray", "SetArrayName", "SetArrayId"),
+        ),
+        "the array is chosen by VDISource.SetScalars(name)",
+    ),
+    "AddInputConnection": "a VDIMapper draws one VDI: give each its own VDIMapper and VDIActor",
 }
 
 _WORLD = (
     "a VDI is placed in the world: leave the coordinate system at WORLD, and move it by "
     "SetUserMatrix or SetPosition"
-)
-_SHADER = (
-    "it changes VTK's ray caster, which a VDI takes the place of: set colours and opacities by the "
-    "volume property, or draw the volume by a vtkVolume and VTK's mapper"
 )
 
 #: Methods of vtkVolume.
@@ -78,46 +52,9 @@ OF_ACTORS: Mapping[str, str] = {
     "SetCoordinateSystem": _WORLD,  # WORLD is 0
     "SetCoordinateSystemToPhysical": _WORLD,
     "SetCoordinateSystemToDevice": _WORLD,
-    "SetCoordinateSystemDevice": _WORLD,
-    "SetShaderProperty": _SHADER,
+    "SetShaderProperty": "its shader shows the VDI: set colours and opacities by the volume "
+    "property, or draw the volume by a vtkVolume and VTK's mapper",
 }
-
-#: Methods of an actor's shader property.
-OF_SHADERS: Mapping[str, str] = {
-    **{f"Add{stage}ShaderReplacement": _SHADER for stage in ("Vertex", "Fragment", "Geometry")},
-    **{f"Set{stage}ShaderCode": _SHADER for stage in ("Vertex", "Fragment", "Geometry")},
-}
-
-#: Render passes that work on depths, of which a VDI, like every volume, writes none, or that draw
-#: meshes after it; and the volumes' own peeling. What of their effect cannot be had.
-_EFFECTS: Mapping[str, str] = {
-    "vtkSSAOPass": "screen-space ambient occlusion (enable_ssao) does not see the VDI, which is "
-    "as dark as what is behind it; ambient_occlusion= of add_vdi (VDISource.SetAmbientOcclusion) "
-    "is its own. VTK's error that volumes must be shaded is about its own mappers",
-    "vtkShadowMapPass": "shadows (enable_shadows) are drawn with their meshes after the VDI, as "
-    "after every volume: it is missing where a mesh is behind it, and casts no shadow",
-    "vtkDepthOfFieldPass": "depth of field (enable_depth_of_field) does not see the VDI, which is "
-    "as sharp as what is behind it",
-    "vtkDualDepthPeelingPass": "depth peeling of volumes (SetUseDepthPeelingForVolumes) cannot "
-    "take a VDI's picture apart: it is drawn over all that is translucent, as without; for "
-    "translucent meshes inside a volume draw that by VTK's own mapper (add_volume)",
-}
-
-
-def effects_without(renderer: Any) -> dict[str, str]:
-    """Return what a renderer's passes cannot do to a VDI, by the passes' classes."""
-    found, pending = set(), [renderer.GetPass()]
-    while pending:
-        each = pending.pop()
-        if each is not None:
-            found.add(each.GetClassName())
-            pending.append(each.GetDelegatePass() if hasattr(each, "GetDelegatePass") else None)
-            members: Any = each.GetPasses() if hasattr(each, "GetPasses") else None
-            count = 0 if members is None else members.GetNumberOfItems()
-            pending += [members.GetItemAsObject(i) for i in range(count)]
-    if renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes():
-        found.add("vtkDualDepthPeelingPass")
-    return {name: text for name, text in _EFFECTS.items() if name in found}
 
 
 def refusing(methods: Mapping[str, str]) -> Callable[[_Class], _Class]:

@@ -10,18 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.vtk_pipeline.drawing.refused import OF_SHADERS, refusing
 from pyvista_vdi.vtk_pipeline.vtk import (
     VTK_FLOAT,
-    vtkHardwareSelector,
-    vtkOpenGLShaderProperty,
+    vtkOpenGLActor,
     vtkTextureObject,
 )
-
-_GL_SCISSOR_BOX = 0x0C10
-
-#: Left, bottom, width and height in pixels of the framebuffer.
-Box = tuple[int, int, int, int]
 
 
 class _Texture:
@@ -41,11 +34,6 @@ class _Texture:
             return False
         return bool(self._texture.GetHandle() != 0)
 
-    @property
-    def there(self) -> bool:
-        """Whether it was made, and not freed."""
-        return self._texture is not None
-
     def let_go(self) -> None:
         """Release the texture unit."""
         if self._texture is not None:
@@ -61,26 +49,24 @@ class _Texture:
 class ImageTexture(_Texture):
     """The image that the shader of an actor looks up."""
 
-    _uploaded: int | None = None
+    _uploaded: NDArray[np.float32] | None = None
 
-    def show(
-        self, window: Any, image: NDArray[np.float32], number: int | None, *, smooth: bool
-    ) -> int:
+    def show(self, window: Any, image: NDArray[np.float32], *, smooth: bool) -> int:
         """Bind an image for the shader, in the window's context; return its texture unit.
 
         ``image`` is RGBA, float32 (H, W, 4), its rows in the order that the shader takes them in.
-        Where ``number`` is that of last time it is not uploaded again. With ``smooth`` texels are
-        interpolated linearly: a full frame's texels are the pixels.
+        The same object as last time is not uploaded again. With ``smooth`` texels are interpolated
+        linearly: a full frame's texels are the pixels.
         """
         filled = self._in_context(window)
         texture = self._texture
         kind = vtkTextureObject.Linear if smooth else vtkTextureObject.Nearest
         texture.SetMinificationFilter(kind)
         texture.SetMagnificationFilter(kind)
-        if not filled or number is None or number != self._uploaded:
+        if not filled or image is not self._uploaded:
             height, width = image.shape[:2]
             texture.Create2DFromRaw(width, height, 4, VTK_FLOAT, image)
-            self._uploaded = number
+            self._uploaded = image
         texture.Activate()
         return int(texture.GetTextureUnit())
 
@@ -106,60 +92,6 @@ class NoDepth(_Texture):
         self._texture.Activate()
 
 
-def shown_box(image: NDArray[np.float32], origin: tuple[int, int], size: tuple[int, int]) -> Box:
-    """Return the pixels of a viewport that a smaller image may show something in.
-
-    Parameters
-    ----------
-    image : ndarray of float32, shape (h, w, 4)
-        Premultiplied RGBA, top row first, interpolated linearly to the viewport.
-    origin, size : (int, int)
-        The viewport's lower left corner and size, framebuffer pixels.
-
-    Returns
-    -------
-    (int, int, int, int)
-        Left, bottom, width and height in framebuffer pixels; zeros where nothing is shown.
-    """
-    there: NDArray[Any] = np.asarray(image.any(axis=2))
-    box = []
-    edges = np.any(there, axis=0), np.any(there[::-1], axis=1)
-    for at_pixels, pixels, start in zip(edges, size, origin, strict=True):
-        (at,) = np.nonzero(at_pixels)
-        if len(at) == 0:
-            return 0, 0, 0, 0
-        # A texel reaches to the centres of its neighbours: half a texel beyond its edges
-        n = len(at_pixels)
-        low = max(0, int((at[0] - 0.5) * pixels / n) - 1)
-        high = min(pixels, int((at[-1] + 1.5) * pixels / n) + 2)
-        box += [(start + low, high - low)]
-    (left, width), (bottom, height) = box
-    return left, bottom, width, height
-
-
-class Scissor:
-    """The window's scissor box, narrowed while a mapper draws; VTK's renderer has it tested."""
-
-    def __init__(self) -> None:
-        self._before: tuple[Any, list[int]] | None = None  # OpenGL's state, and its scissor box
-
-    def narrow(self, window: Any, box: Box) -> None:
-        """Draw in this box alone, and within what was set, until :meth:`end`."""
-        # What a frame that VTK broke off has left is not set again: each renderer sets its own box
-        state, before = window.GetState(), [0, 0, 0, 0]
-        state.vtkglGetIntegerv(_GL_SCISSOR_BOX, before)
-        low = [max(a, b) for a, b in zip(before[:2], box[:2], strict=True)]
-        high = [min(before[i] + before[i + 2], box[i] + box[i + 2]) for i in (0, 1)]
-        state.vtkglScissor(*low, *(max(0, h - b) for b, h in zip(low, high, strict=True)))
-        self._before = state, before
-
-    def end(self) -> None:
-        """Set what was set before."""
-        before, self._before = self._before, None
-        if before is not None:
-            before[0].vtkglScissor(*before[1])
-
-
 _DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
 
 #: A sampler takes the number of its texture unit, and VTK knows of no custom uniform of that kind:
@@ -175,7 +107,7 @@ _VIEWPORT = "vdiViewport"
 
 #: The image is premultiplied RGBA of the whole viewport, top row first. The pixel's place is taken
 #: from its number: from a vertex position it would take three matrices, per pixel.
-#: finalizeRayCast keeps picking and window/level.
+#: finalizeRayCast keeps window and level, and selections.
 _LOOKUP = f"""
   g_fragColor = texture(vdiImage, (gl_FragCoord.xy - {_VIEWPORT}.xy) * {_VIEWPORT}.zw);
   finalizeRayCast();
@@ -200,36 +132,6 @@ _UNSEEN = """
   fragOutput2 = vec4(0.0);
 """
 
-#: For a selection's passes. Row 0 of the texture is one texel of numbers that no uniform can carry:
-#: the area's lower left corner in the framebuffer and its size, pixels. Above it lie the area's
-#: hits: (window depth, -, -, 1), or zeros for none.
-_FIRST_HIT = """
-  ivec4 area = ivec4(texelFetch(vdiImage, ivec2(0, 0), 0));
-  ivec2 place = ivec2(gl_FragCoord.xy) - area.xy;
-  if (any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, area.zw)))
-    {
-    discard;
-    }
-  vec4 hit = texelFetch(vdiImage, place + ivec2(0, 1), 0);
-  if (hit.a == 0.0)
-    {
-    discard;
-    }
-  gl_FragDepth = hit.r;
-"""
-
-#: finalizeRayCast chooses the colour of the passes that ask which prop it is.
-_PROP = """
-  g_fragColor = vec4(1.0);
-  finalizeRayCast();
-"""
-
-#: VTK would number the voxels from 1, and the only cell of the proxy is cell 0.
-_CELL = """
-  fragOutput0 = vec4(0.0, 0.0, 0.0, 1.0);
-"""
-
-
 #: For boxes that float32 cannot place: one about the origin, whose front or back face, whichever is
 #: not culled, is made the viewport, at the near plane.
 _FILL = """
@@ -250,51 +152,48 @@ _UNUSED = (
 )
 
 
-@refusing(OF_SHADERS)
-class VDIShaderProperty(vtkOpenGLShaderProperty):
-    """The shader property of a VDI's actor: what is added to it by others is refused."""
+def show_image(actor: Any, renderer: Any = None) -> None:
+    """Make an actor's shader look its colours up in an image of the viewport, as a renderer draws.
 
-    def ClearAllShaderReplacements(self, *args: Any) -> None:
-        """Leave what shows the VDI: there are no others. So do all that follow."""
-
-    ClearAllVertexShaderReplacements = ClearAllShaderReplacements
-    ClearAllFragmentShaderReplacements = ClearAllShaderReplacements
-    ClearAllGeometryShaderReplacements = ClearAllShaderReplacements
-    ClearVertexShaderReplacement = ClearAllShaderReplacements
-    ClearFragmentShaderReplacement = ClearAllShaderReplacements
-    ClearGeometryShaderReplacement = ClearAllShaderReplacements
-
-
-#: What the class above keeps from others, by VTK's own methods.
-_add_fragment = vtkOpenGLShaderProperty.AddFragmentShaderReplacement
-_add_vertex = vtkOpenGLShaderProperty.AddVertexShaderReplacement
-_clear_vertex = vtkOpenGLShaderProperty.ClearVertexShaderReplacement
-
-
-def show_image(actor: Any, *, occluded: bool = False, peeled: bool = False) -> None:
-    """Make an actor's shader look its colours up in an image of the viewport.
-
-    ``occluded`` says whether the frame has a pass of screen-space ambient occlusion, ``peeled``
-    whether volumes are drawn by depth peeling.
+    A property that is modified has the shader rebuilt, so what is in place is left.
     """
     shader = actor.GetShaderProperty()
-    if _CALL not in _placed(shader):
-        _add_fragment(shader, "//VTK::Base::Dec", True, _DECLARATION, False)
-        _add_fragment(shader, _CUSTOM, True, _UNIFORMS, False)
+    peeled = occluded = False
+    if renderer is not None:
+        peeled = renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes()
+        occluded = "vtkSSAOPass" in _passes(renderer.GetPass())
+    if occluded and actor.GetPropertyKeys() is not None:  # which the pass has given it
+        actor.GetPropertyKeys().Remove(vtkOpenGLActor.GLDepthMaskOverride())
+    text = _PEELED if peeled else _LOOKUP + _UNSEEN if occluded else _LOOKUP
+    placed = _placed(shader)
+    if not placed:
+        shader.AddFragmentShaderReplacement("//VTK::Base::Dec", True, _DECLARATION, False)
+        shader.AddFragmentShaderReplacement(_CUSTOM, True, _UNIFORMS, False)
         for unused in _UNUSED:
-            _add_fragment(shader, unused, True, "", False)
-    if peeled:
-        _replace(shader, _PEELED)
-    else:
-        _replace(shader, _LOOKUP + _UNSEEN if occluded else _LOOKUP)
+            shader.AddFragmentShaderReplacement(unused, True, "", False)
+    if placed.get(_CALL) != text:
+        shader.AddFragmentShaderReplacement(_CALL, True, text, False)
+        placed[_CALL] = text
+
+
+def _passes(first: Any) -> set[str]:
+    """Return the classes of a render pass and of those behind it."""
+    if first is None:
+        return set()
+    behind = [first.GetDelegatePass()] if hasattr(first, "GetDelegatePass") else []
+    members: Any = first.GetPasses() if hasattr(first, "GetPasses") else None
+    count = 0 if members is None else members.GetNumberOfItems()
+    behind += [members.GetItemAsObject(i) for i in range(count)]
+    return {first.GetClassName()}.union(*map(_passes, behind))
 
 
 def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:
     """Set which texture unit the image is in, and which viewport it fills, framebuffer pixels."""
-    place_texture(actor, unit)
     (x, y), (width, height) = origin, size
     place = (float(x), float(y + height), 1 / max(1, width), -1 / max(1, height))
-    actor.GetShaderProperty().GetFragmentCustomUniforms().SetUniform4f(_VIEWPORT, place)
+    uniforms = actor.GetShaderProperty().GetFragmentCustomUniforms()
+    uniforms.SetUniformi("vdiImage", unit)
+    uniforms.SetUniform4f(_VIEWPORT, place)
 
 
 def fill_viewport(actor: Any, edge: float | None) -> None:
@@ -305,31 +204,9 @@ def fill_viewport(actor: Any, edge: float | None) -> None:
         return
     _placed(shader)[_POSITION] = text
     if text is None:
-        _clear_vertex(shader, _POSITION, True)
+        shader.ClearVertexShaderReplacement(_POSITION, True)
     else:
-        _add_vertex(shader, _POSITION, True, text, False)
-
-
-def place_texture(actor: Any, unit: int) -> None:
-    """Set which texture unit the image is in, in the frame that begins."""
-    actor.GetShaderProperty().GetFragmentCustomUniforms().SetUniformi("vdiImage", unit)
-
-
-def show_first_hits(actor: Any, selection_pass: int) -> None:
-    """Draw first hits, at their depth, in place of the image.
-
-    ``selection_pass`` is what ``vtkHardwareSelector::GetCurrentPass`` says.
-    """
-    cells = (vtkHardwareSelector.CELL_ID_LOW24, vtkHardwareSelector.CELL_ID_HIGH24)
-    which = _CELL if selection_pass in cells else _PROP
-    _replace(actor.GetShaderProperty(), _FIRST_HIT + which)
-
-
-def _replace(shader: Any, text: str) -> None:
-    """Put the text in place, unless it is: a property that is modified has the shader rebuilt."""
-    if _placed(shader).get(_CALL) != text:
-        _add_fragment(shader, _CALL, True, text, False)
-        _placed(shader)[_CALL] = text
+        shader.AddVertexShaderReplacement(_POSITION, True, text, False)
 
 
 def _placed(shader: Any) -> dict[str, str | None]:

@@ -29,17 +29,14 @@ class MapperSettings:
     draw: Draw = "auto"
     regenerate: Policy = "auto"
     regenerate_below: float | None = None
-    automatic_view: bool = True
     opacity_multiplier: float = 1.0
     transmittance_cutoff: float = TRANSMITTANCE_CUTOFF
     image_distance: float = 1.0
     picking_opacity: float = 0.05  # as in VTK's pickers for volumes
-    picking_accumulated: bool = True
     adjust: bool = True
     adjust_multi_samples: bool = True
-    update_rate: float = 1.0  # as vtkSmartVolumeMapper
     target: float | None = None
-    off_screen: bool | None = None
+    off_screen: bool = False
 
     @property
     def previews(self) -> bool:
@@ -68,10 +65,9 @@ _METHODS = {
     ),
     "regenerate": _Method(
         "Regenerate",
-        'what decides that a view needs a VDI of its own: ``"auto"``, ``"never"`` or a callable',
+        'what decides that a view needs a VDI of its own: ``"auto"`` or ``"never"``',
         'By ``"auto"`` an estimate of the view\'s error does, where somebody watches; by '
-        '``"never"`` only ``actor.regenerate()``. A callable gets a '
-        ":class:`~pyvista_vdi.vtk_pipeline.VDIStatus` once per frame.",
+        '``"never"`` only ``actor.regenerate()``.',
         checked_policy,
     ),
     "regenerate_below": _Method(
@@ -80,9 +76,6 @@ _METHODS = {
         "``None`` is 0.95 where another VDI is made for it, and 0.98 with the detail of the "
         "picture's pixels where the volume is drawn in its place.",
         checked_bound,
-    ),
-    "automatic_view": _Method(
-        "AutomaticView", "whether a source without camera gets the view of the first frame", ""
     ),
     "opacity_multiplier": _Method(
         "OpacityMultiplier",
@@ -106,31 +99,19 @@ _METHODS = {
     "picking_opacity": _Method(
         "PickingOpacity",
         "the opacity that a ray must reach in the VDI to pick it, 0 to below 1",
-        "What is compared says ``SetPickingAccumulated``.",
+        "It is that from the ray's beginning on.",
         checked_opacity,
-    ),
-    "picking_accumulated": _Method(
-        "PickingAccumulated",
-        "whether the opacity from the ray's beginning is compared, or each supersegment's",
-        "",
     ),
     "adjust": _Method(
         "AutoAdjustSampleDistances",
         "whether previews of fewer pixels are drawn while the view moves",
-        "That is where the window's desired update rate is at least "
-        "``GetInteractiveUpdateRate()``. Frames at rest, screenshots, exports and off-screen "
-        "windows are always full.",
+        "That is where the window's desired update rate is at least 1 per second. Frames at rest, "
+        "screenshots, exports and off-screen windows are always full.",
     ),
     "adjust_multi_samples": _Method(
         "AutoAdjustMultiSamples",
         "whether previews go without multisampling where that makes them late",
         "All VDIs in a window must allow it; ``GetMultiSamples()`` stays as it was set.",
-    ),
-    "update_rate": _Method(
-        "InteractiveUpdateRate",
-        "the window's desired update rate from which on a frame is interactive, 1/s",
-        "",
-        lambda rate: checked_rate("the interactive update rate", rate),
     ),
     "target": _Method(
         "TargetFrameRate",
@@ -142,8 +123,7 @@ _METHODS = {
     "off_screen": _Method(
         "InteractiveOffScreen",
         "whether off-screen windows are treated as if somebody watched them",
-        "``None``: those that a browser shows through a remote view of trame, as in notebooks.",
-        lambda on: None if on is None else bool(on),
+        "",
     ),
 }
 

@@ -21,7 +21,7 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.io.vdi_file.layout import plain_number
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.vdi import VDI, Lists
+from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.vtk_pipeline import vtk
 
@@ -202,7 +202,7 @@ def volume_to_image(volume: Volume, name: str | None = None) -> vtk.vtkImageData
     return image
 
 
-def vdi_to_image(vdi: Lists) -> vtk.vtkImageData:
+def vdi_to_image(vdi: VDI | DeferredVDI) -> vtk.vtkImageData:
     """Return a VDI in its canonical VTK form.
 
     Parameters

@@ -35,7 +35,7 @@ _OF_GRADIENTS = {"shading": "shading (shade = True)", "gradient_opacities": "gra
 
 
 class Input:
-    """A VDI that does not change; and what others do who show several VDIs, or make them."""
+    """A VDI, or what an algorithm's port has; and what others do who show several, or make them."""
 
     #: The series or the set whose VDIs are shown.
     collection: VDICollection | None = None
@@ -54,11 +54,19 @@ class Input:
     #: Whether something goes on that the event loop has to look at.
     busy = False
 
-    def __init__(self, vdi: VDI | None = None) -> None:
+    def __init__(self, vdi: VDI | None = None, port: Any = None) -> None:
         self._vdi = vdi
+        if port is not None:  # of canonical images
+            self.port, self._producer = port, port.GetProducer()  # which a port does not keep
+        self._read_at: int | None = None
 
     def vdi(self) -> VDI | None:
         """Return the VDI, brought up to date; raises what went wrong."""
+        if self.port is not None:
+            self._producer.Update(self.port.GetIndex())
+            image = self._producer.GetOutputDataObject(self.port.GetIndex())
+            if self._vdi is None or self._read_at != image.GetMTime():
+                self._vdi, self._read_at = as_vdi(vdi_from_image(image)), image.GetMTime()
         return self._vdi
 
     def last(self) -> VDI | None:
@@ -72,7 +80,11 @@ class Input:
 
     def stamp(self) -> Any:
         """Return something that changes whenever it is worth trying again."""
-        return None if self._vdi is None else id(self._vdi)
+        if self.port is None:
+            return None if self._vdi is None else id(self._vdi)
+        self._producer.UpdateInformation()
+        time = wanted_time(self._producer.GetOutputInformation(self.port.GetIndex()))
+        return self._producer.GetMTime(), time
 
     def note_scene(self, renderers: Sequence[Any], model_transform: NDArray[np.float64]) -> None:
         """Note the renderers that show it, for their lights, and the actor's matrix, (4, 4)."""
@@ -119,30 +131,6 @@ class Input:
         return []
 
 
-class ImageInput(Input):
-    """A canonical image, from a port of any algorithm that makes one."""
-
-    def __init__(self, port: Any) -> None:
-        super().__init__()
-        self.port = port
-        self._producer = port.GetProducer()  # a port does not keep its algorithm
-        self._read_at: int | None = None
-
-    def vdi(self) -> VDI | None:
-        """Return the VDI, brought up to date."""
-        self._producer.Update(self.port.GetIndex())
-        image = self._producer.GetOutputDataObject(self.port.GetIndex())
-        if self._vdi is None or self._read_at != image.GetMTime():
-            self._vdi, self._read_at = as_vdi(vdi_from_image(image)), image.GetMTime()
-        return self._vdi
-
-    def stamp(self) -> Any:
-        """Return the newest time stamp of all that it depends on."""
-        self._producer.UpdateInformation()
-        time = wanted_time(self._producer.GetOutputInformation(self.port.GetIndex()))
-        return self._producer.GetMTime(), time
-
-
 class SourceInput(Input):
     """What a :class:`VDISource` makes."""
 
@@ -157,16 +145,13 @@ class SourceInput(Input):
         self._camera: Camera | None = None  # what frames gave, which nobody has set
         self._size: tuple[int, int] | None = None
 
-    def shared(self) -> Input:
-        """Return an input from the same source."""
-        return self._from(self.source)
-
     def separate(self) -> SourceInput:
         """Return an input from a source of its own, with the same settings and VDI."""
-        return self._from(self.source.Copy())
+        return self.shared(self.source.Copy())
 
-    def _from(self, source: VDISource) -> SourceInput:
-        other = SourceInput(source)
+    def shared(self, source: VDISource | None = None) -> SourceInput:
+        """Return an input from the same source, or from another one that is alike."""
+        other = SourceInput(source or self.source)
         other._camera, other._size, other.of_scene = self._camera, self._size, self.of_scene
         return other
 
@@ -439,6 +424,6 @@ def input_of_port(port: Any) -> Input:
     producer = port.GetProducer()
     if isinstance(producer, VDISource):
         return SourceInput(producer)
-    image = ImageInput(port)
-    image.vdi()  # refuse what is no VDI now
-    return image
+    shown = Input(port=port)
+    shown.vdi()  # refuse what is no VDI now
+    return shown

@@ -1,32 +1,18 @@
-"""What a person is told of a VDI on the screen: its status, corner texts and warnings."""
+"""What a person is told of a VDI on the screen: its status and warnings."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from pyvista_vdi.errors import InvalidArgumentError, VDIWarning, warn_external
+from pyvista_vdi.errors import VDIWarning, warn_external
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.costs import RenderMode
 from pyvista_vdi.quality.targets import describe
-from pyvista_vdi.vtk_pipeline.vtk import vtkCornerAnnotation, weakly
 
 _log = logging.getLogger(__name__)
-
-#: VTK's names of the corners.
-CORNERS = {
-    "lower left": vtkCornerAnnotation.LowerLeft,
-    "lower right": vtkCornerAnnotation.LowerRight,
-    "upper left": vtkCornerAnnotation.UpperLeft,
-    "upper right": vtkCornerAnnotation.UpperRight,
-}
-
-#: Largest font of the corner text, points.
-_FONT_SIZE = 14
-#: Progress after which a text is drawn again though nothing else has changed.
-_PROGRESS_STEP = 0.05
 
 
 @dataclass(frozen=True)
@@ -122,57 +108,8 @@ class VDIStatus:
         return ", ".join(parts)
 
 
-class CornerTexts:
-    """Annotations that show a status; the renderers own them."""
-
-    def __init__(self) -> None:
-        self._texts: list[tuple[Callable[[], Any], Callable[[], Any], int]] = []
-        self._progress: float | None = None
-
-    def add(self, renderer: Any, corner: str) -> vtkCornerAnnotation:
-        """Add one to a corner of a renderer."""
-        if corner not in CORNERS:
-            raise InvalidArgumentError(f"corner must be one of {tuple(CORNERS)}; got {corner!r}")
-        annotation = vtkCornerAnnotation()
-        annotation.SetMaximumFontSize(_FONT_SIZE)
-        annotation.PickableOff()
-        look = annotation.GetTextProperty()  # white on a shade: legible on any background
-        look.SetColor(1.0, 1.0, 1.0)
-        look.SetBackgroundColor(0.0, 0.0, 0.0)
-        look.SetBackgroundOpacity(0.5)
-        renderer.AddViewProp(annotation)
-        self._texts.append((weakly(annotation), weakly(renderer), CORNERS[corner]))
-        return annotation
-
-    def write(self, renderer: Any, status: Callable[[], VDIStatus]) -> None:
-        """Show the status in the frame that this renderer is drawing."""
-        if self._texts:
-            self._texts = [text for text in self._texts if text[0]() is not None]
-        for text, where, corner in self._texts:
-            if where() is not renderer:
-                continue
-            annotation, now = text(), status()
-            self._progress = now.progress
-            lines = str(now).replace(", ", "\n")
-            if annotation.GetText(corner) != lines:
-                annotation.SetText(corner, lines)
-                # It was laid out in the opaque pass, which is over when volumes are drawn
-                annotation.RenderOpaqueGeometry(renderer)
-
-    def are_behind(self, progress: float | None) -> bool:
-        """Whether there are texts, and what they say of the progress is too old."""
-        if not self._texts or progress == self._progress:
-            return False
-        if progress is None or self._progress is None:
-            return True
-        return abs(progress - self._progress) >= _PROGRESS_STEP
-
-
 class Warnings:
-    """Says each thing once, as a :class:`~pyvista_vdi.VDIWarning`.
-
-    Exceptions cannot pass through VTK's renderer.
-    """
+    """Says each thing once, as a VDIWarning: exceptions cannot pass through VTK's renderer."""
 
     def __init__(self) -> None:
         self._said: set[Hashable] = set()
@@ -181,15 +118,13 @@ class Warnings:
         self, message: str, error: BaseException | None = None, *, cause: Hashable = None
     ) -> None:
         """Warn, unless this, or its cause, was said before; a traceback goes to the log."""
-        if error is not None:
-            _log.debug("%s", message, exc_info=error)
-        if (cause or message) in self._said:
-            return
-        self._said.add(cause or message)
-        try:
-            warn_external(message)
-        except VDIWarning:  # warnings are errors: the log is what is left
-            _log.error(message)
+        _log.debug("%s", message, exc_info=error)
+        if (cause or message) not in self._said:
+            self._said.add(cause or message)
+            try:
+                warn_external(message)
+            except VDIWarning:  # warnings are errors: the log is what is left
+                _log.error(message)
 
     def forget(self) -> None:
         """Forget what was said, so that it is said again if it comes up again."""

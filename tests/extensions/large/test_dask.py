@@ -81,14 +81,6 @@ def test_values_are_the_same_by_workers(client, scene, default_runtime):
     assert generate(volume, camera, size, client=client, **options).equals(expected)
 
 
-@pytest.mark.slow
-def test_occlusion_is_the_same_by_workers(client, scene, default_runtime):
-    arguments, options = scene
-    options = {**options, "ambient_occlusion": 8.0}
-    expected = generate_in_blocks(*arguments, device=default_runtime, **options)
-    assert generate_in_blocks(*arguments, client=client, **options).equals(expected)
-
-
 def kill_once(pid, fraction):
     """Return a progress callback that kills a worker once that much is done."""
     alive = [True]

@@ -153,32 +153,6 @@ def volume(folder):
     simple.SaveScreenshot(str(folder / "vdi.png"), flat, ImageResolution=SIZE)
 
 
-def deferred(folder):
-    """Edit the colours and opacities of a file's values."""
-    asked = json.loads((folder / "asked.json").read_text())
-    reader = simple.OpenDataFile(str(folder / "kept.vdi"))
-    simple.SaveData(str(folder / "again.vdi"), reader)
-    view = black_view(SIZE)
-    shown = simple.Show(simple.VDIInScene(Input=reader), view)
-    shown.Opacity = 0
-    view.CameraPosition = asked["camera"]["position"]
-    view.CameraFocalPoint = asked["camera"]["focal_point"]
-    view.CameraViewUp = asked["camera"]["view_up"]
-    view.CameraViewAngle = asked["camera"]["view_angle"]
-    picture = simple.VDIToImage(Input=reader)
-    table = shown.LookupTable  # what the colour map editor edits
-    ends = [table.RGBPoints[0], table.RGBPoints[-4]]
-    found = {"array": list(shown.ColorArrayName), "range": ends}
-    table.ColorSpace = "RGB"
-
-    for i, look in enumerate(asked["looks"]):
-        table.RGBPoints, table.ScalarOpacityFunction.Points = look
-        simple.SaveScreenshot(str(folder / f"scene_{i}.png"), view, ImageResolution=SIZE)
-        picture.UpdatePipeline()
-        save_pixels(picture, folder / f"file_{i}.npy")
-    (folder / "found.json").write_text(json.dumps(found))
-
-
 def mistakes(folder):
     """Do what cannot be done; ParaView says why, and goes on."""
     source = simple.VDISource(Input=simple.Wavelet())

@@ -17,7 +17,6 @@ TIMES = (0.0, 0.5, 2.0, 4.0)
 KEPT = {
     "classification": "deferred",
     "value_range": RANGE,
-    "settings": pvdi.Settings(importance=[1, 2]),
 }
 LOOK = {"cmap": "bone", "opacity": [0, 0.2, 0.8], "clim": (40, 170)}
 

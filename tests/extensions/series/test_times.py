@@ -9,14 +9,12 @@ from strategies import random_vdi
 from vtk_sources import ready_source, some_property
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import SourceInput
 from pyvista_vdi.vtk_pipeline.vtk import (
     VTKPythonAlgorithmBase,
     vtkDataObject,
     vtkImageData,
-    vtkRTAnalyticSource,
     vtkStreamingDemandDrivenPipeline,
 )
 
@@ -127,17 +125,3 @@ def test_each_source_keeps_its_time_whatever_others_ask_for(vdis):
     third = source_of(producer)
     producer.UpdateTimeStep(1.0)
     assert third.GetVDI().equals(vdis[1])
-
-
-def test_a_series_of_a_source_with_times(vdis):
-    producer = Moving()
-    prop = some_property()
-    series = pvdi.generate_series(producer, CAMERA, SIZE, volume_property=prop, precision="exact")
-    assert producer.read == [0, 1, 2]
-    assert series.times == TIMES
-    assert all(one.equals(other) for one, other in zip(series, vdis, strict=True))
-
-
-def test_what_cannot_be_a_series_is_refused():
-    with pytest.raises(InvalidArgumentError, match="vtkRTAnalyticSource announces no time steps"):
-        pvdi.generate_series(vtkRTAnalyticSource(), CAMERA, SIZE)

@@ -1,13 +1,13 @@
 """What the tests of this room share."""
 
 import pytest
-from browsers import browser_address, chromium, file_of, open_page, shared_pages
+from browsers import chromium, file_of, open_page, shared_pages
 from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.standard_cases import filling_camera
 
-__all__ = ["browser_address", "chromium", "data", "open_page", "shared_pages", "vdi"]
+__all__ = ["chromium", "data", "open_page", "shared_pages", "vdi"]
 
 
 @pytest.fixture(scope="module")

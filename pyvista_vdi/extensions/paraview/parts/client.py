@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from vtkmodules.vtkCommonCore import vtkOutputWindow
-
-from pyvista_vdi.vtk_pipeline.filters.algorithm import watch
 
 
 class Client:
@@ -20,24 +18,13 @@ class Client:
     @classmethod
     def of(cls, algorithm: Any, *, silent: bool = False) -> Client | None:
         """Return the client side, or ``None`` after having said why there is none."""
-        manager = _manager()
+        manager = manager_of_proxies()
         for _, proxy in _proxies(manager, "sources") if manager else ():
             if proxy.GetClientSideObject() is algorithm:
                 return cls(manager, proxy)
         if not silent:
             say(algorithm, "client and server are two processes: set properties from the client")
         return None
-
-    @classmethod
-    def watch(cls, algorithm: Any, event: str, changed: Callable[[Any], None]) -> bool:
-        """Call ``changed(algorithm)`` at an event of the manager; return whether there is one."""
-        manager = _manager()
-        return bool(manager and watch(manager, algorithm, changed, event))
-
-    def views(self) -> list[Any]:
-        """Return the proxies of render views."""
-        views = (proxy for _, proxy in _proxies(self.manager, "views"))
-        return [view for view in views if hasattr(view.GetClientSideObject(), "GetRenderer")]
 
     def representations(self) -> list[tuple[str, Any]]:
         """Return the names and proxies of what shows the algorithm's output in views."""
@@ -68,7 +55,8 @@ def _proxies(manager: Any, group: str) -> Iterator[tuple[str, Any]]:
         yield name, manager.GetProxy(group, name)
 
 
-def _manager() -> Any:
+def manager_of_proxies() -> Any:
+    """Return ParaView's manager of proxies; false where there is none in this process."""
     from paraview.modules.vtkRemotingServerManager import vtkSMProxyManager
 
     started = vtkSMProxyManager.IsInitialized()

@@ -15,52 +15,22 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, watch
 
 
-def sets(attribute: str, read: Callable[..., Any] = lambda value: value) -> Any:
-    """Return a method that sets what is made of its arguments, and is out of date if it differs."""
-    return lambda self, *values: self._change(attribute, read(*values))
-
-
-class Looks:
-    """A volume property with the functions that were copied into it last."""
-
-    def __init__(self) -> None:
-        self.prop = vtkVolumeProperty()
-        self.prop.SetColor(vtkColorTransferFunction())
-        self.prop.SetScalarOpacity(vtkPiecewiseFunction())
-        self._copied: Any = None
-
-    def copy(
-        self, functions: Sequence[Any], ends: tuple[float, float], unit_distance: float
-    ) -> None:
-        """Take ParaView's colours and opacities as they are now; for ``None``, ramps over ``ends``.
-
-        What has not changed since is not copied again: it would look like another look.
-        """
-        color, opacity = functions
-        of_functions = [f and (f.GetAddressAsString(""), f.GetMTime()) for f in functions]
-        copied = (*of_functions, ends, unit_distance)
-        if copied == self._copied:
-            return
-        self._copied = copied
-        ramp, slope = vtkColorTransferFunction(), vtkPiecewiseFunction()
-        for x, share in zip(ends, (0.0, 1.0), strict=True):
-            ramp.AddRGBPoint(x, share, share, share)
-            slope.AddPoint(x, share)
-        # A plain copy, not ParaView's object: that one gives as few colours as its table holds,
-        # which its volumes do not show either
-        self.prop.GetRGBTransferFunction().DeepCopy(color or ramp)
-        self.prop.GetScalarOpacity().DeepCopy(opacity or slope)
-        self.prop.SetScalarOpacityUnitDistance(unit_distance)
-
-
 class Functions(Algorithm):
-    """The properties of transfer functions: the algorithm is out of date when one is changed."""
+    """The properties of transfer functions: the algorithm is out of date when one is changed.
+
+    ``looks`` is a volume property with the functions that were copied into it last.
+    """
 
     def __init__(self, **ports: Any) -> None:
         super().__init__(**ports)
         self._unit_distance: float | None = None
         self._functions: dict[str, Any] = {"color": None, "opacity": None}
+        self._by_default: dict[str, Any] = {}
         self._observers: dict[str, int] = {}
+        self.looks = vtkVolumeProperty()
+        self.looks.SetColor(vtkColorTransferFunction())
+        self.looks.SetScalarOpacity(vtkPiecewiseFunction())
+        self._copied: Any = None
 
     def SetColorFunction(self, function: Any) -> None:
         """Set ParaView's colour transfer function, or ``None`` for the default."""
@@ -70,7 +40,10 @@ class Functions(Algorithm):
         """Set ParaView's opacity transfer function, or ``None`` for the default."""
         self._follow("opacity", function)
 
-    SetUnitDistance = sets("_unit_distance", lambda distance: distance or None)
+    def SetUnitDistance(self, distance: float) -> None:
+        """Set where opacities hold; 0 is the default."""
+        self._unit_distance = distance or None
+        self.Modified()
 
     def _follow(self, role: str, function: Any) -> None:
         """Be out of date whenever a transfer function changes."""
@@ -86,12 +59,42 @@ class Functions(Algorithm):
     def _function_changed(self) -> None:
         self.Modified()
 
+    def take_looks(self, name: str, ends: Sequence[float], unit_distance: float) -> None:
+        """Take the given colours and opacities as they are now.
 
-def functions_of_array(client: Client, name: str, ends: tuple[float, float] | None) -> list[Any]:
+        By default they are those that ParaView has for the array of that ``name``, which are
+        followed; with a server of its own ramps over ``ends``, the least and the largest scalar.
+        What has not changed since is not copied again: it would look like another look.
+        """
+        client = Client.of(self, silent=True)
+        if client is not None:
+            proxies = functions_of_array(client, name, ends)
+            for role, proxy in zip(self._functions, proxies, strict=True):
+                function, before = proxy.GetClientSideObject(), self._functions[role]
+                if before in (None, self._by_default.get(role)) and before is not function:
+                    self._follow(role, function)
+                    self._by_default[role] = function
+        functions, distance = [*self._functions.values()], self._unit_distance or unit_distance
+        of_functions = [f and (f.GetAddressAsString(""), f.GetMTime()) for f in functions]
+        copied = (*of_functions, tuple(ends), distance)
+        if copied == self._copied:
+            return
+        self._copied = copied
+        ramp, slope = vtkColorTransferFunction(), vtkPiecewiseFunction()
+        for x, share in zip(ends, (0.0, 1.0), strict=True):
+            ramp.AddRGBPoint(x, share, share, share)
+            slope.AddPoint(x, share)
+        # A plain copy, not ParaView's object: that one gives as few colours as its table holds,
+        # which its volumes do not show either
+        self.looks.GetRGBTransferFunction().DeepCopy(functions[0] or ramp)
+        self.looks.GetScalarOpacity().DeepCopy(functions[1] or slope)
+        self.looks.SetScalarOpacityUnitDistance(distance)
+
+
+def functions_of_array(client: Client, name: str, ends: Sequence[float]) -> list[Any]:
     """Return the proxies of the colours and opacities that ParaView has for an array.
 
-    ``ends``: the least and the largest scalar, over which they then lie where ParaView has shown
-    the array nowhere yet.
+    They lie over ``ends`` where ParaView has shown the array nowhere yet.
     """
     from paraview.modules.vtkRemotingViews import (
         vtkSMTransferFunctionManager,
@@ -101,7 +104,7 @@ def functions_of_array(client: Client, name: str, ends: tuple[float, float] | No
     functions = vtkSMTransferFunctionManager()
     color = functions.GetColorTransferFunction(name, client.manager)
     opacity = functions.GetOpacityTransferFunction(name, client.manager)
-    if ends is not None and not client.values("ScalarRangeInitialized", color)[0]:
+    if not client.values("ScalarRangeInitialized", color)[0]:
         for function in (color, opacity):
             vtkSMTransferFunctionProxy.RescaleTransferFunction(function, *ends)
     return [color, opacity]
@@ -109,7 +112,12 @@ def functions_of_array(client: Client, name: str, ends: tuple[float, float] | No
 
 def _of_lens(name: str, read: Callable[..., Any] = lambda *value: value) -> Any:
     """Return a method that sets one of the camera's arguments, a number or three."""
-    return lambda self, *value: self._change("_lens", {**self._lens, name: read(*value)})
+
+    def setter(self: Any, *value: Any) -> None:
+        self._lens[name] = read(*value)
+        self.Modified()
+
+    return setter
 
 
 class Looking(Algorithm):
@@ -124,13 +132,17 @@ class Looking(Algorithm):
             "view_up": (0.0, 1.0, 0.0),
         }
 
-    SetView = sets("_camera_chosen", lambda which: which == CAMERA)
     SetCameraPosition = _of_lens("position")
     SetCameraFocalPoint = _of_lens("focal_point")
     SetCameraViewUp = _of_lens("view_up")
     SetCameraViewAngle = _of_lens("view_angle", float)
     SetCameraParallelProjection = _of_lens("parallel_projection", bool)
     SetCameraParallelScale = _of_lens("parallel_scale", float)
+
+    def SetView(self, which: int) -> None:
+        """Choose the camera of the properties, or the default view."""
+        self._camera_chosen = which == CAMERA
+        self.Modified()
 
     def SetSize(self, width: int, height: int) -> None:
         """Set the window; 0 is the default one."""

@@ -1,4 +1,4 @@
-"""The properties of the plugin's filters, readers and writer, in ParaView's XML."""
+"""The properties of the plugin's filters, reader and writer, in ParaView's XML."""
 
 from __future__ import annotations
 
@@ -18,10 +18,9 @@ def properties(lines: str) -> str:
     """Return the XML of properties that are written a line each, with two spaces between columns.
 
     These are a name, the kind and the defaults of its values, a domain, and the documentation. A
-    name may have a setter of another name behind ``:``; behind ``@`` another property, which must
-    be 1 for this one to be seen; and ``!`` at its end, if it is an advanced one. A domain is
-    ``bool``, numbers ``0..1``, numbered texts ``(a|b)``, or texts ``[a|b]``; ``-`` is none. Lines
-    of XML stay as they are.
+    name may have a setter of another name behind ``:``, and ``!`` at its end, if it is an advanced
+    one. A domain is ``bool``, numbers ``0..1``, numbered texts ``(a|b)``, or texts ``[a|b]``; ``-``
+    is none. Lines of XML stay as they are.
     """
     rows = lines.strip().splitlines()
     return "\n".join(
@@ -32,8 +31,7 @@ def properties(lines: str) -> str:
 
 def _property(name: str, values: str, domain: str, text: str = "") -> str:
     panel = ' panel_visibility="advanced"' if name.endswith("!") else ""
-    name, _, seen = name.removesuffix("!").partition("@")
-    name, _, command = name.partition(":")
+    name, _, command = name.removesuffix("!").partition(":")
     kind, _, defaults = values.partition(" ")
     count, texts = len(defaults.split()) or 1, domain[1:-1].split("|")
     low, _, high = domain.partition("..")
@@ -48,17 +46,11 @@ def _property(name: str, values: str, domain: str, text: str = "") -> str:
         ends = f'min="{" ".join([low] * count)}"' + (f' max="{high}"' if high else "")
         inside = f'<{kind}RangeDomain name="range" {ends} />'
     inside += f"<Documentation>{text}</Documentation>" if text else ""
-    inside += _visible_where(seen) if seen else ""
     return (
         f'<{kind}VectorProperty name="{name}" command="{command or f"Set{name}"}" '
         f'number_of_elements="{count}" default_values="{defaults}"{panel}>{inside}'
         f"</{kind}VectorProperty>"
     )
-
-
-def _visible_where(name: str) -> str:
-    decorator = f'type="GenericDecorator" mode="visibility" property="{name}" value="1"'
-    return f"<Hints><PropertyWidgetDecorator {decorator} /></Hints>"
 
 
 def _button(name: str, label: str, text: str) -> str:
@@ -84,12 +76,12 @@ def _number(option: str, more: str = "") -> str:
 
 #: Camera properties of our filters and of ParaView's render views alike.
 _CAMERA = """
-CameraPosition@View            Double 0 0 1  -
-CameraFocalPoint@View          Double 0 0 0  -
-CameraViewUp@View              Double 0 1 0  -
-CameraViewAngle@View           Double 30     -
-CameraParallelProjection@View  Int 0         bool
-CameraParallelScale@View       Double 1      -
+CameraPosition!            Double 0 0 1  -
+CameraFocalPoint!          Double 0 0 0  -
+CameraViewUp!              Double 0 1 0  -
+CameraViewAngle!           Double 30     -
+CameraParallelProjection!  Int 0         bool
+CameraParallelScale!       Double 1      -
 """
 CAMERA_PROPERTIES = re.findall("Camera[A-Z][a-zA-Z]+", _CAMERA)
 
@@ -113,27 +105,25 @@ them.
 """)
 
 
-#: Where opacities hold.
-UNIT_DISTANCE_XML = properties(
-    "ScalarOpacityUnitDistance:SetUnitDistance  Double 0  0..  Length over which the opacity "
-    "function's opacities are reached, in the volume's units. 0: the diagonal over the mean number "
-    "of points along an edge, or, of a VDI that keeps values, of its volume's."
+def _function(name: str, what: str, group: str) -> str:
+    """Return what a volume, or values, are classified by."""
+    text = f"{what} of scalars; by default those that ParaView has for the array."
+    return (
+        f'<ProxyProperty name="{name}" command="Set{name}"><ProxyGroupDomain name="groups">'
+        f'<Group name="{group}" /></ProxyGroupDomain><Documentation>{text}</Documentation>'
+        "</ProxyProperty>"
+    )
+
+
+FUNCTIONS_XML = (
+    _function("ColorFunction", "Colours", "lookup_tables")
+    + _function("OpacityFunction", "Opacities", "piecewise_functions")
+    + properties(
+        "ScalarOpacityUnitDistance:SetUnitDistance  Double 0  0..  Length over which the opacity "
+        "function's opacities are reached, in the volume's units. 0: the diagonal over the mean "
+        "number of points along an edge, or, of a VDI that stores scalars, of its volume's."
+    )
 )
-
-
-def functions_xml(default: str) -> str:
-    """Return what a volume, or values, are classified by; ``default`` says by what otherwise."""
-    found = ""
-    for name, what, group in (
-        ("ColorFunction", "Colours", "lookup_tables"),
-        ("OpacityFunction", "Opacities", "piecewise_functions"),
-    ):
-        domain = f'<ProxyGroupDomain name="groups"><Group name="{group}" /></ProxyGroupDomain>'
-        text = f"<Documentation>{what} of scalars; by default {default}.</Documentation>"
-        told = f'name="{name}" command="Set{name}"'
-        found += f"<ProxyProperty {told}>{domain}{text}</ProxyProperty>"
-    return found + UNIT_DISTANCE_XML
-
 
 _ARRAYS = (
     '<StringVectorProperty name="Scalars" command="SetArray" number_of_elements="5" '
@@ -142,18 +132,9 @@ _ARRAYS = (
     '<Property name="Input" function="Input" /></RequiredProperties></ArrayListDomain>'
     "<Documentation>The array that is classified.</Documentation></StringVectorProperty>"
 )
-_IMPORTANCE = (
-    '<DoubleVectorProperty name="Importance" command="AddImportance" repeatable="1" '
-    'clean_command="ClearImportance" repeat_command="1" number_of_elements="0" '
-    'number_of_elements_per_command="2" panel_visibility="advanced"><Documentation>'
-    f"{_sentence('importance', ': pairs of a scalar and a weight')}</Documentation>"
-    f"{_visible_where('Classification')}</DoubleVectorProperty>"
-)
-_FOLLOW = "Use the transfer functions that ParaView has for this array, and follow their changes."
 SOURCE_XML = properties(f"""
 {_ARRAYS}
-{functions_xml("ramps over the scalars' range")}
-{_button("TakeTransferFunctions", "Take the array's colours and opacities", _FOLLOW)}
+{FUNCTIONS_XML}
 InterpolationType:SetInterpolation  Int 1  (Nearest|Linear)
 Shade           Int 0     bool  Light the volume by one headlight at the generating view.
 Ambient!        Double 0  -
@@ -161,11 +142,8 @@ Diffuse!        Double 1  -
 Specular!       Double 0  -
 SpecularPower!  Double 1  -
 AmbientOcclusion:SetOcclusion  Int 0  bool  {_sentence("ambient_occlusion")}
-AmbientOcclusionRadius:SetOcclusionRadius!  Double 0  0..  How far around it that is looked for, \
-in the volume's units. 0: the default radius.
 Classification             Int 0       (baked|deferred)  {_sentence("classification")}
-ValueRange@Classification  Double 0 0  -                 {_sentence("value_range", ". 0 0: all")}
-{_IMPORTANCE}
+ValueRange!                Double 0 0  -                 {_sentence("value_range", ". 0 0: all")}
 MaxSupersegments         {_number("max_supersegments")}
 SampleDistance:SetStep!  {_number("sample_distance", ". 0: the default")}
 Tolerance!               {_number("tolerance")}
