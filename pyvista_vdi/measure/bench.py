@@ -43,7 +43,6 @@ def take_turns(
     repeats: int,
     *,
     warm_up: bool = True,
-    clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, list[float]]:
     """Time pieces of work, one after the other in turn, and return the seconds by name.
 
@@ -54,9 +53,9 @@ def take_turns(
     taken: dict[str, list[float]] = {name: [] for name in work}
     for _ in range(repeats):
         for name, step in work.items():
-            begin = clock()
+            begin = time.perf_counter()
             step()
-            taken[name].append(clock() - begin)
+            taken[name].append(time.perf_counter() - begin)
     return taken
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidVDIError, UnsupportedError, VDIWarning
+from pyvista_vdi.errors import UnsupportedError, VDIWarning
 
 pv = pytest.importorskip("pyvista")
 
@@ -116,12 +116,6 @@ def test_shading_that_is_switched_on_later_is_warned_of_and_left_out(default_run
     assert np.array_equal(before, after)
     actor.prop.GetScalarOpacity().AddPoint(100, 1.0)  # is seen all the same, and nothing is said
     assert np.abs(seen(plotter) - before).mean() > 0.2
-
-
-def test_a_mapper_names_the_remedy(default_runtime, plotter):
-    kept = pvdi.generate(volume(), plotter.camera, (48, 36), classification="deferred")
-    with pytest.raises(InvalidVDIError, match="classified"):
-        pvdi.VDIMapper().SetInputData(kept)
 
 
 def test_picks_and_the_vdi_have_the_look_of_now(default_runtime, plotter):

@@ -11,7 +11,6 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
 from pyvista_vdi.model.options import QualityTarget
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
-from pyvista_vdi.quality.targets import LADDER
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
 
@@ -39,13 +38,6 @@ def test_the_status_says_what_was_chosen_and_is_predicted(plotter):
     actor.regenerate(pvdi.Camera((3, -4, 1), (0, 0, 0), (0, 0, 1)))
     assert actor.vdi is not before
     assert actor.status.dial["asked"] == {"quality": "balanced"}
-
-
-def test_precision_and_limits_reach_the_vdi(plotter):
-    assert shown(plotter, precision="8-byte").vdi.precision == "8-byte"
-    with pytest.warns(VDIWarning, match=r"1e\+09 full frames per second cannot be reached"):
-        actor = shown(plotter, full_fps=1e9, name="fast")
-    assert actor.vdi.metadata["max_supersegments"] == LADDER[0].max_supersegments
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError
 
 pytest.importorskip("pyvista")
 
@@ -51,10 +50,3 @@ def test_the_name_is_a_colour_map_of_the_same_look(name):
     given = Looks(cmap=name, clim=(0, 5), opacity="sigmoid").lookup_table(HOUNSFIELD)
     assert given.scalar_range == (0, 5)
     assert not np.array_equal(given.values[:, 3], one.values[:, 3])
-
-
-def test_unknown_names():
-    with pytest.raises(InvalidArgumentError, match="did you mean 'ct-bone'"):
-        pvdi.presets["ct-bones"]
-    assert "ct-bones" not in pvdi.presets
-    assert len(repr(pvdi.presets).splitlines()) == len(pvdi.presets)

@@ -92,3 +92,27 @@ def test_a_vdi_is_no_volume(tmp_path):
     pv.read(tmp_path / "a.vdi").save(tmp_path / "a.vti")
     with pytest.raises(InvalidVolumeError, match=r"a\.vti is a VDI in its VTK form"):
         read(tmp_path / "a.vti")
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize(("distance", "points"), [(4000, 8), (60, 32)])
+def test_a_store_is_shown_at_the_level_of_the_view(distance, points, tmp_path, default_runtime):
+    zarr = pytest.importorskip("zarr")
+    group, values = zarr.open_group(tmp_path, mode="w", zarr_format=2), np.ones((32,) * 3, "u1")
+    levels = [(str(k), step) for k, step in enumerate((1, 2, 4))]
+    for path, step in levels:
+        group.create_array(path, data=values[::step, ::step, ::step])
+    scales = [{"type": "scale", "scale": [float(step)] * 3} for _, step in levels]
+    sets = [
+        {"path": path, "coordinateTransformations": [scale]}
+        for (path, _), scale in zip(levels, scales, strict=True)
+    ]
+    axes = [{"name": name, "type": "space"} for name in "zyx"]
+    group.attrs["multiscales"] = [{"version": "0.4", "datasets": sets, "axes": axes}]
+    plotter = pv.Plotter(off_screen=True, window_size=(64, 48))
+    plotter.camera_position = ((16, 16, distance), (16, 16, 16), (0, 1, 0))
+    actor = plotter.add_vdi(pvdi.read_volume(tmp_path), clim=(0, 2))
+    assert actor.mapper.dataset.dimensions == (points,) * 3
+    # Opacities are of the finest level's voxels
+    assert actor.prop.opacity_unit_distance == pytest.approx(3**0.5, rel=0.05)
+    plotter.close()
