@@ -7,8 +7,6 @@ PYVISTA_VDI_TEST_DEVICES
     contain one; "all": on every usable one. By default on the one that users get.
 PYVISTA_VDI_TEST_AS_GPU
     "1": devices pass for GPUs, and clang checks each program for one (tests/support/as_gpu.py).
-PYVISTA_VDI_TEST_WHOLE
-    "1": the slow tests measure all cases of the standard table, an hour, in place of a sample.
 PYVISTA_VDI_REQUIRE_DEVICE
     "1": having no usable device is a failure, as in CI; otherwise such tests are skipped.
 PYVISTA_VDI_REQUIRE_INSTALLED
@@ -25,7 +23,6 @@ import os
 import re
 import signal
 import sysconfig
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -136,12 +133,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         needed = {name for mark in item.iter_markers("extension") for name in mark.args}
         if not needed <= {*registry.extensions()}:
             item.add_marker(pytest.mark.skip(f"needs the extension {', '.join(sorted(needed))}"))
-        some = item.get_closest_marker("every")
-        if some is not None:
-            # By the case's name: other cases on another device, the same in every process
-            chosen = zlib.crc32(item.name.encode()) % some.args[0] == 0
-            if not chosen and item.function in seen:
-                item.add_marker("slow")
         if any(map(item.get_closest_marker, ("slow", "paraview"))):
             continue
         if "runtime" in getattr(item, "fixturenames", ()):

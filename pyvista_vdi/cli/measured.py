@@ -7,7 +7,6 @@ import json
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import asdict
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -58,14 +57,14 @@ def compare(options: argparse.Namespace) -> int:
 
 
 def tradeoff(options: argparse.Namespace) -> int:
-    """Measure what each setting costs and gives, and write JSON, tables and a plot."""
+    """Measure what each setting costs and gives, and write JSON and tables."""
     look = classification(options)
     Classification.composited(look, "tradeoff")  # refused before the volume is read
     # With --quick the last of an axis's usual values
     quick = bool(options.quick)
     usual = {n: values[-1:] if quick else values for n, values in AXES.items()}
     axes = dict(_axis(text, usual) for text in options.sweep or DEFAULT_AXES)
-    settings = sweep(axes, pairs=not quick)
+    settings = sweep(axes)
     name, volume = volume_name(options), read_volume(options)
     if not set(look) - {"interpolation"} and not volume.rgba:
         # A ramp from transparent black to opaque white, which needs no PyVista
@@ -89,10 +88,7 @@ def tradeoff(options: argparse.Namespace) -> int:
         print(f"dominated: {worse} (by {better[0]})")
     write_text(files["json"], json.dumps(as_json(asdict(found)), indent=1) + "\n")
     write_text(files["md"], found.table())
-    if find_spec("matplotlib") is None or not found.points:
-        del files["png"]
-    else:
-        found.save_plot(files["png"])
+    found.save_plot(files["png"])
     say_written(files.values())
     return 0
 

@@ -59,7 +59,7 @@ angles         A,B,...   from the generating view (default: 5,30,60; quick: 5,30
 repeats=5      COUNT     timed frames
 generations=3  COUNT     timed generations of each VDI
 sweep  AXIS[=A,B,...] ...  settings, with other values than usual: max-supersegments, \
-tolerance, lists, precision, skip-empty, preview, criterion, view-cone, sample-distance
+tolerance, lists, precision, criterion, view-cone, sample-distance
 table:
 """
 

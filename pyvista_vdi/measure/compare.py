@@ -1,8 +1,7 @@
 """One volume rendered by VTK's mappers, our volume raycaster and a VDI, side by side.
 
-Pictures are compared at the accuracy step (half the smallest spacing unless given), frames are
-timed with steps of one voxel in every volume renderer (``docs/dev/conventions.md``). The candidates
-take turns, after one frame each that is not counted, and the median is reported.
+Pictures are compared at half the smallest spacing unless given, frames are timed with steps of one
+voxel. The candidates take turns, after one frame each that is not counted; medians are reported.
 """
 
 from __future__ import annotations
@@ -62,16 +61,14 @@ def measure(
     """Render one volume in every way, compare the pictures and time the frames.
 
     ``classification`` has arguments of :func:`pyvista_vdi.generate`. ``window_size`` is that of the
-    VDI and of all frames, ``angles`` are degrees of ``Azimuth`` from V_O. ``sample_distance`` is
-    the accuracy step, model units; ``repeats`` are timed frames of each candidate and view, of
-    which 0 compares pictures and times nothing. ``progress`` is called with the finished fraction.
+    VDI and of all frames, ``angles`` are degrees of ``Azimuth`` from V_O, ``sample_distance`` is
+    the accuracy step, model units, and ``repeats`` are timed frames of each candidate and view;
+    with 0 nothing is timed.
 
     Returns the figures, what was generated from V_O, and the pictures by angle and by the keys of
     :data:`NAMES`, float32 (H, W, 3 or 4) over black. Each of the figures' ``views`` has ``near``,
-    the comparisons by names such as "vdi_to_raycaster", ``seconds`` by candidate, and
-    ``ratio_to_vtk``, the VDI's seconds over those of the faster of VTK's mappers.
-    Raises MissingDependencyError or DeviceError if VTK takes part and cannot be loaded, or draws
-    nothing, or the OpenCL device fails; InvalidArgumentError if nothing is to be seen.
+    the comparisons, ``seconds`` by candidate, and ``ratio_to_vtk``, the VDI's seconds over those of
+    the faster of VTK's mappers.
     """
     measuring.check_plan(angles, least=0, repeats=repeats)
     looks = Classification.composited(classification, "compare")
@@ -171,10 +168,7 @@ def table(report: Mapping[str, Any]) -> str:
 
 
 def contact_sheet(report: Mapping[str, Any], images: Mapping[float, Images]) -> NDArray[np.uint8]:
-    """Return all panels in one picture: a row per angle, a column per renderer.
-
-    uint8 (height, width, 3), top row first; black behind the panels, captions above them.
-    """
+    """Return all panels in one picture: a row per angle, a column per renderer, uint8 (H, W, 3)."""
     from PIL import Image, ImageDraw, ImageFont
 
     columns = [name for name in NAMES if name in next(iter(images.values()))]

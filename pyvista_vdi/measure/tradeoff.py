@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIError
 from pyvista_vdi.io import whole_file
@@ -29,34 +29,19 @@ from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.vtk_pipeline.vtk import BACKEND
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 #: What settings may change, and the values of a sweep; the last three are swept on request.
-#: ``lists`` are those along an edge of the VDI over pixels along that edge of the frame;
-#: ``preview`` is the share of the frame's edges that is drawn before it is brought to size,
+#: ``lists`` are those along an edge of the VDI over pixels along that edge of the frame,
 #: ``sample_distance`` that of generation over the smallest spacing.
 AXES: Mapping[str, tuple[Any, ...]] = {
     "max_supersegments": (5, 10, 15, 30, 40),
     "tolerance": (0.01, 0.1),
     "lists": (0.5, 1.5, 2.0),
     "precision": ("8-byte",),
-    "skip_empty": (False,),
-    "preview": (0.7, 0.5, 0.35),
     "criterion": ("homogeneity",),
     "view_cone": (0.0, 30.0, 90.0),
     "sample_distance": (0.25, 1.0),
 }
-DEFAULT_AXES = tuple(AXES)[:6]
-
-#: What is worth changing together: bytes saved and spent on lists, and time saved twice.
-PAIRS: tuple[Mapping[str, Any], ...] = (
-    {"max_supersegments": 10, "lists": 2.0},
-    {"max_supersegments": 40, "precision": "8-byte"},
-    {"lists": 2.0, "precision": "8-byte"},
-    {"max_supersegments": 10, "lists": 2.0, "precision": "8-byte"},
-    {"lists": 0.5, "preview": 0.5},
-)
+DEFAULT_AXES = tuple(AXES)[:4]
 
 #: What SSIM is traded for, how tables call it, and differences that do not count.
 COSTS = {
@@ -71,8 +56,8 @@ SSIM_TOLERANCE = 0.0005
 Setting = Mapping[str, Any]
 
 
-def sweep(axes: Mapping[str, Sequence[Any]] | None = None, *, pairs: bool = True) -> list[Setting]:
-    """Return settings: the default, every value of every axis by itself, and pairs of them.
+def sweep(axes: Mapping[str, Sequence[Any]] | None = None) -> list[Setting]:
+    """Return settings: the default, and every value of every axis by itself.
 
     ``axes`` has values by name, by default those of :data:`DEFAULT_AXES`.
 
@@ -83,21 +68,14 @@ def sweep(axes: Mapping[str, Sequence[Any]] | None = None, *, pairs: bool = True
     [{}, {'lists': 0.5}, {'lists': 2}]
     """
     chosen = {name: AXES[name] for name in DEFAULT_AXES} if axes is None else axes
-    alone = [{name: value} for name, values in chosen.items() for value in values]
-    together = [p for p in PAIRS if pairs and all(v in chosen.get(n, ()) for n, v in p.items())]
-    return [{}, *alone, *together]
+    return [{}, *({name: value} for name, values in chosen.items() for value in values)]
 
 
 def _check(setting: Setting) -> None:
-    """Refuse an unknown name, and a value out of its range."""
-    for name in setting:
-        if name not in AXES:
-            raise InvalidArgumentError(f"there is no axis {name!r}: known are {', '.join(AXES)}")
-    for name, least, most in (("lists", 0.05, 8.0), ("preview", 0.02, 1.0)):
-        if not least <= (value := setting.get(name, 1.0)) <= most:
-            raise InvalidArgumentError(f"{name} must be from {least:g} to {most:g}; got {value!r}")
-    others = ("lists", "preview", "skip_empty")
-    GenerationOptions(**{name: value for name, value in setting.items() if name not in others})
+    """Refuse an unknown name, or a value out of its range."""
+    if not 0.05 <= (value := setting.get("lists", 1.0)) <= 8:
+        raise InvalidArgumentError(f"lists must be from 0.05 to 8; got {value!r}")
+    GenerationOptions(**{name: value for name, value in setting.items() if name != "lists"})
 
 
 @dataclass(frozen=True)
@@ -106,14 +84,12 @@ class Point:
 
     ``costs`` by the keys of :data:`COSTS`: frame time over that of ``render_volume`` (geometric
     mean of the angles), MiB on the device and in the ``.vdi``, and generation with packing over a
-    frame of ``render_volume`` from V_O at steps of half a voxel. ``noise``: half of what lies
-    between the least and the most repetition, over the median, of those that are times. ``frames``
-    and ``ssims`` (to ``render_volume``) by angle.
+    frame of ``render_volume`` from V_O at steps of half a voxel. ``frames`` and ``ssims`` (to
+    ``render_volume``) by angle.
     """
 
     setting: dict[str, Any]
     costs: dict[str, float]
-    noise: dict[str, float]
     frames: dict[float, float]
     ssims: dict[float, float]
 
@@ -131,17 +107,12 @@ class Point:
 def dominates(one: Point, other: Point, costs: Sequence[str] = tuple(COSTS)) -> bool:
     """Whether a setting is nowhere worse than another in SSIM and some costs, and better in one.
 
-    Differences count above a tolerance, and gains in time above the noise of both, too. In units of
-    the tolerances gains must outweigh losses, so that no settings give way to each other in turn.
+    Differences count above a tolerance, and in units of the tolerances gains must outweigh losses,
+    so that no settings give way to each other in turn.
     """
     gains = [(one.ssims[angle] - other.ssims[angle]) / SSIM_TOLERANCE for angle in one.ssims]
-    clear = list(gains)
-    for cost in costs:
-        tolerance, gain = COSTS[cost][1], math.log(other.costs[cost] / one.costs[cost])
-        gains.append(gain / tolerance)
-        noise = one.noise.get(cost, 0.0) + other.noise.get(cost, 0.0)
-        clear.append((gain - noise) / tolerance)
-    return min(gains) >= -1 and max(clear) > 1 and sum(gains) > 0
+    gains += [math.log(other.costs[cost] / one.costs[cost]) / COSTS[cost][1] for cost in costs]
+    return min(gains) >= -1 and max(gains) > 1 and sum(gains) > 0
 
 
 @dataclass(frozen=True)
@@ -154,8 +125,6 @@ class Tradeoff:
 
     def front(self, kind: str) -> list[str]:
         """Return the settings that none dominates in SSIM and one of COSTS, the cheapest first."""
-        if kind not in COSTS:
-            raise InvalidArgumentError(f"kind must be one of {', '.join(COSTS)}; got {kind!r}")
         ordered = sorted(self.points, key=lambda one: one.costs[kind])
         return [a.name for a in ordered if not any(dominates(b, a, (kind,)) for b in ordered)]
 
@@ -185,35 +154,26 @@ class Tradeoff:
         system = ", ".join(f"{name} {value}" for name, value in plan["system"].items())
         return "\n".join([*lines, "", system, ""])
 
-    def plot(self) -> Figure:
-        """Return a Matplotlib figure of SSIM over each cost."""
+    def save_plot(self, path: str | os.PathLike[str]) -> Path:
+        """Write SSIM over each cost as a PNG by Matplotlib; it appears whole or not at all."""
         if find_spec("matplotlib") is None:
             raise MissingDependencyError(
                 "plots are drawn by Matplotlib, which is not installed: install it by pip install "
                 '"pyvista-vdi[plot]"'
             )
-        if not self.points:
-            raise InvalidArgumentError("nothing was measured, so there is nothing to draw")
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(14.0, 10.0), layout="constrained")
         figure.suptitle(f"{self.plan['name']}: what settings cost and give (better: up and left)")
         for panel, kind in zip(figure.subplots(2, 2).flat, COSTS, strict=True):
-            places = [(one.costs[kind], one.ssim) for one in self.points]
-            panel.scatter(*zip(*places, strict=True), c="white", edgecolors="gray")
-            front = [one for one in self.points if one.name in self.front(kind)]
-            line = sorted((one.costs[kind], one.ssim) for one in front)
-            panel.plot(*zip(*line, strict=True), color="#aaaaaa", drawstyle="steps-post", zorder=0)
-            for one in front:
-                panel.scatter(one.costs[kind], one.ssim, label=one.name)
+            panel.scatter(*zip(*((one.costs[kind], one.ssim) for one in self.points), strict=True))
+            for name in self.front(kind):
+                one = next(each for each in self.points if each.name == name)
+                panel.scatter(one.costs[kind], one.ssim, label=name)
             panel.legend(loc="lower right", fontsize=8)
             panel.set(xlabel=COSTS[kind][0], ylabel="SSIM, mean of the angles")
-        return figure
-
-    def save_plot(self, path: str | os.PathLike[str]) -> Path:
-        """Write the plot as PNG; the file appears whole or not at all."""
         with whole_file(path) as stream:
-            self.plot().savefig(stream, dpi=110, format="png")
+            figure.savefig(stream, dpi=110, format="png")
         return Path(path)
 
 
@@ -239,19 +199,13 @@ def measure_tradeoff(
     where the machine is now faster and now slower. Pictures are compared with ``render_volume`` at
     steps of half a voxel.
 
-    Parameters
-    ----------
-    volume, camera, device, **classification
-        As for :func:`pyvista_vdi.generate`; by default the view that the volume fills.
-    settings, name : sequence of Setting, str
-        What is compared, :func:`sweep`'s default unless given; what the volume is called.
-    window_size, angles : sequence
-        Of all frames, pixels; the new views, degrees of ``Azimuth`` from V_O.
-    repeats, generations : int
-        Timed frames of each setting at each angle, and timed generations.
-    vtk, progress : bool, callable
-        Whether VTK's mappers are timed beside, by default where VTK is installed; called with the
-        finished fraction, 0 to 1, and what is being done.
+    ``volume``, ``camera``, ``device`` and the classification are as for
+    :func:`pyvista_vdi.generate`; by default the view is the one that the volume fills. ``settings``
+    are :func:`sweep`'s default unless given, ``name`` is what the volume is called, ``window_size``
+    that of all frames, ``angles`` are new views, degrees of ``Azimuth`` from V_O, ``repeats`` timed
+    frames of each setting at each angle, ``generations`` timed generations. ``vtk``: whether VTK's
+    mappers are timed beside, by default where VTK is installed. ``progress`` is called with the
+    finished fraction, 0 to 1, and what is being done.
     """
     keywords = tuple(measure_tradeoff.__kwdefaults__ or ())
     looks = Classification.composited(classification, "measure_tradeoff", keywords)
@@ -296,49 +250,31 @@ def _vtk_times(bench: Bench, plan: Mapping[str, Any]) -> dict[str, float]:
 
 def _point(bench: Bench, setting: Setting, plan: Mapping[str, Any]) -> Point:
     """Return the figures of a setting."""
-    from skimage.transform import resize  # loads SciPy
-
-    def window(share: float) -> tuple[int, int]:
-        width, height = (max(1, round(edge * share)) for edge in bench.size)
-        return width, height
-
     options = {"sample_distance": 0.5, "precision": "exact", "lists": 1.0, **setting}
     options["sample_distance"] *= bench.voxel
-    precision, lists = options.pop("precision"), window(options.pop("lists"))
-    preview, skip_empty = window(options.pop("preview", 1.0)), options.pop("skip_empty", True)
+    precision, share = options.pop("precision"), options.pop("lists")
+    width, height = (max(1, round(edge * share)) for edge in bench.size)
     made: list[Any] = []
 
     def generate() -> None:
-        made[:] = [bench.generate(lists, **options).with_precision(precision)]
+        made[:] = [bench.generate((width, height), **options).with_precision(precision)]
 
     work: dict[str, Step] = {"volume": partial(bench.raycast, bench.view), "vdi": generate}
     generation = take_turns(work, plan["generations"])
     with tempfile.TemporaryDirectory() as folder:
         size = made[0].save(Path(folder) / "vdi.vdi").stat().st_size
-    frames, ssims, noises = {}, {}, []
+    frames, ssims = {}, {}
     for angle in plan["angles"]:
         camera = bench.view.azimuth(angle)
-        draw = partial(bench.draw, made[0], camera, preview, skip_empty=skip_empty)
-        picture = draw()
-        if preview != bench.size:  # as the texture unit does, by GL_LINEAR and CLAMP_TO_EDGE
-            shape = (*bench.size[::-1], 4)
-            picture = resize(picture, shape, order=1, mode="edge", anti_aliasing=False)
-        ssims[angle] = compare_images(picture, bench.reference(camera)).ssim
+        draw = partial(bench.draw, made[0], camera)
+        ssims[angle] = compare_images(draw(), bench.reference(camera)).ssim
         volume = partial(bench.raycast, camera, bench.voxel)
         taken = take_turns({"volume": volume, "vdi": draw}, plan["repeats"])
         frames[angle] = ratio(taken["vdi"], taken["volume"])
-        noises.append(_spread(taken["vdi"]))
     costs = {
         "frame": statistics.geometric_mean(frames.values()),
         "memory": prepared_vdi(bench.runtime, made[0]).list_bytes / 2**20,
         "file": size / 2**20,
         "generation": ratio(generation["vdi"], generation["volume"]),
     }
-    noise = {"frame": max(noises), "generation": _spread(generation["vdi"])}
-    return Point(dict(setting), costs, noise, frames, ssims)
-
-
-def _spread(values: Sequence[float]) -> float:
-    """Return half of what lies between the least and the most, over the median; of few infinity."""
-    few = len(values) < 3
-    return math.inf if few else (max(values) - min(values)) / 2 / statistics.median(values)
+    return Point(dict(setting), costs, frames, ssims)

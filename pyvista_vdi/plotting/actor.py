@@ -67,8 +67,8 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
         return other
 
     def NewInstance(self) -> PlotterVDIMapper:  # noqa: N802
-        """Return another mapper of the same theme, with nothing to draw yet."""
-        return PlotterVDIMapper(theme=self._theme)
+        """Return another mapper, with nothing to draw yet."""
+        return PlotterVDIMapper()
 
     def ShallowCopy(self, other: Any) -> None:  # noqa: N802
         """Draw what another mapper of this class draws, in the same way, with its lookup table."""

@@ -101,7 +101,7 @@ class Placement(Options):
 
 @record
 @dataclass(frozen=True, eq=False)
-class Making(Options):
+class InputOptions(Options):
     """What a VDI is made of, from where, and by what."""
 
     resolution: Sequence[float] | None = option(None, "spacing of a NumPy array; 1 by default")
@@ -129,7 +129,7 @@ class Addition:
     array: ArrayChoice
     look: Looks
     place: Placement
-    making: Making
+    making: InputOptions
     options: GenerationOptions
     target: QualityTarget
     deferral: Deferral

@@ -50,10 +50,6 @@ class Costs:
         mean = each if before is None else before + _NEWEST * (each - before)
         return replace(self, volume=mean) if way == "volume" else replace(self, vdi=mean)
 
-    def chosen(self, way: RenderMode) -> Costs:
-        """Note which way is drawn."""
-        return self if way == self.way else replace(self, way=way)
-
     def better(
         self, angle: float, pixels: float, seconds: float | None, ssim: float | None, bound: float
     ) -> RenderMode:

@@ -240,7 +240,7 @@ def _watched(seen: Seen) -> Plan:
         way: RenderMode = "volume"
         if made.coverage == 1 and (seen.moving or made.magnification <= FINE_ENOUGH):
             way = _better(seen, made)
-        costs = seen.costs.chosen(way)
+        costs = replace(seen.costs, way=way)
         return _planned(seen, way, made.content, costs=costs, **rest)
     return _planned(seen, "vdi", **rest)
 

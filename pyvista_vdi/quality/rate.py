@@ -60,8 +60,8 @@ class FrameRate:
     frames: dividing the overhead by the samples as well would make every correction too small.
     Nothing changes within a twentieth of the target. A frame that takes more than twice, or less
     than half, of what was expected is set aside, and dropped as a stall unless the next is off in
-    the same sense: then the two are the new truth. Where the overhead alone misses the target, the work
-    gets a quarter of the frame's time.
+    the same sense: then the two are the new truth. Where the overhead alone misses the target, the
+    work gets a quarter of the frame's time.
     """
 
     target_fps: float = 30.0  # to be kept

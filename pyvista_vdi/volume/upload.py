@@ -21,7 +21,6 @@ from pyvista_vdi.model.lighting import Light, Lights, Shading
 from pyvista_vdi.model.transfer_function import GRADIENT_SHARE, TransferFunction
 from pyvista_vdi.model.volume import Geometry, Volume
 from pyvista_vdi.volume.bricks import Room, in_parts
-from pyvista_vdi.volume.kernels import MACROCELL_RANGES
 from pyvista_vdi.volume.rays import Variant
 
 T = TypeVar("T")
@@ -280,7 +279,9 @@ def _macrocell_ranges(
     macrocells = macrocells_over(dimensions)
     n = int(np.prod(macrocells))
     ranges = runtime.buffer((n, 2), name="ranges of macrocells")
-    launch = runtime.bind(MACROCELL_RANGES, variant.defines, voxels=voxels, ranges=ranges)
+    launch = runtime.bind(
+        "volume/macrocells.cl", "macrocell_ranges", variant.defines, voxels=voxels, ranges=ranges
+    )
     launch(padded(n, GROUP), (GROUP,), size=(*dimensions, 0), macrocells=(*macrocells, 0))
     return ranges
 

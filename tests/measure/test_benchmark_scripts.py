@@ -6,7 +6,6 @@ import ast
 import importlib
 import json
 import os
-import re
 import shlex
 import subprocess
 import sys
@@ -21,14 +20,6 @@ if not BENCHMARKS.is_dir():
 pytest.importorskip("tqdm")
 sys.path.insert(0, str(BENCHMARKS))
 
-from shared import Case, sample  # noqa: E402
-
-CASES = [
-    Case(volume, look, (96, 64), angle, options=(("max_supersegments", 8),))
-    for volume, looks in (("small", ("a",)), ("large", ("a", "b", "c", "d")))
-    for look in looks
-    for angle in (0.0, 5.0, 30.0)
-]
 
 #: The least that reaches each script's end.
 RUNS = {
@@ -43,26 +34,6 @@ RUNS = {
     "scaling": "--volume brain --repeats 1",
     "trees": "--other .. --volumes brain --repeats 1",
 }
-
-
-@pytest.mark.fast
-def test_a_draw_is_the_same_in_every_run_and_has_all_strata():
-    drawn = sample(CASES, 5)
-    assert drawn == sample(CASES, 5) == sorted(drawn, key=CASES.index)
-    # A fifth of the cases are of the small volume
-    assert [sum(case.volume == name for case in drawn) for name in ("small", "large")] == [1, 4]
-    assert {case.volume for case in sample(CASES, 2)} == {"small", "large"}
-    assert {case.angle for case in sample(CASES, 3, lambda case: case.angle)} == {0.0, 5.0, 30.0}
-    assert sample(CASES, 99) == CASES
-
-
-def test_every_script_is_run_and_listed_with_the_question_that_it_answers():
-    scripts = {path.stem for path in BENCHMARKS.glob("*.py")}
-    assert scripts == set(RUNS)
-    assert len(scripts) <= 10
-    about = (BENCHMARKS / "README.md").read_text(encoding="utf-8")
-    listed = set(re.findall(r"^\| `(\w+)\.py` \| .*\?", about, re.MULTILINE))
-    assert listed == scripts
 
 
 @pytest.mark.parametrize(

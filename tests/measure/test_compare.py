@@ -9,11 +9,9 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io
-from pyvista_vdi.errors import DeviceError
 from pyvista_vdi.measure.bench import as_json
 from pyvista_vdi.measure.compare import NAMES, measure
-from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
 
 SIZE = (96, 64)
 LOOKS = {"cmap": "viridis", "opacity": "linear", "interpolation": "linear"}
@@ -63,62 +61,6 @@ def test_the_report_holds_every_figure(measured):
 
 
 @pytest.mark.gl
-@pytest.mark.parametrize("mapper", ["gpu", "fixed_point"])
-@pytest.mark.parametrize("parallel", [False, True])
-def test_peers_see_the_view_as_we_do(mapper, parallel, volume, default_runtime):
-    """With all that a transfer function has: light and gradient opacity."""
-    pytest.importorskip("pyvista")
-    from pyvista_vdi.measure.vtk_mappers import VTKMapper, property_of
-
-    matrix = np.diag([1.0, -1.3, 0.8, 1.0])  # mirrored, scaled
-    matrix[:3, 3] = (0.5, 2.0, -1.0)
-    bounds = np.array(volume.bounds).reshape(3, 2)
-    centre = matrix[:3, :3] @ bounds.mean(axis=1) + matrix[:3, 3]
-    camera = pvdi.Camera(
-        np.add(centre, (20, -60, 30)),
-        centre,
-        (0.2, 0, 1),
-        parallel_projection=parallel,
-        parallel_scale=16,
-        window_center=(0.1, -0.2),
-        model_transform=matrix,
-    )
-    shades = np.linspace(0, 1, 64)
-    function = pvdi.TransferFunction(
-        np.stack([shades, 1 - shades, shades**2], axis=1),
-        0.5 * shades,
-        volume.finite_range(),
-        interpolation="linear",
-        # The fixed-point mapper shades by other normals, and looks gradients up in a coarse table
-        shading=pvdi.Shading() if mapper == "gpu" else None,
-        gradient_opacities=(0.2, 1.0) if mapper == "gpu" else None,
-        gradient_range=(0.0, 10.0) if mapper == "gpu" else None,
-    )
-    peer = VTKMapper(volume, property_of(volume, function), SIZE, mapper)
-    try:
-        theirs = peer.image(camera, 0.2)
-    finally:
-        peer.close()
-    ours = pvdi.render_volume(
-        volume,
-        camera,
-        SIZE,
-        transfer_function=function,
-        settings=pvdi.Settings(sample_distance=0.2),
-    )
-    # Measured: GPU above 0.999, fixed-point from 0.987, which is how far VTK's two are apart (see
-    # above). The same picture shifted by one pixel has 0.951, upside down 0.84.
-    assert compare_images(ours, theirs).ssim > {"gpu": 0.995, "fixed_point": 0.97}[mapper]
-
-
-@pytest.mark.gl
-def test_a_blank_picture_is_an_error(volume, default_runtime):
-    pytest.importorskip("pyvista")
-    with pytest.raises(DeviceError, match="VTK's gpu mapper drew nothing: every pixel is black"):
-        measure(volume, {"opacity": [0.0, 0.0, 0.0]}, SIZE, angles=(0,), repeats=1)
-
-
-@pytest.mark.gl
 def test_the_command_writes_a_table_a_picture_figures_and_the_vdi(
     default_runtime, tmp_path, capsys
 ):
@@ -140,3 +82,16 @@ def test_the_command_writes_a_table_a_picture_figures_and_the_vdi(
     # 8 bytes a supersegment and their lists' headers, of the arrays' 24 and the packed form
     assert report["sizes"]["device_bytes"] < 0.5 * report["sizes"]["vdi_bytes"]
     assert vdi.camera == filling_camera(vdi.bounds, (80, 48))
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize(("name", "way"), [("brain", "linear"), ("rayleigh_taylor", "nearest")])
+def test_shipped_volumes_are_as_vtk_draws_them(name, way, default_runtime):
+    """With the soft transfer function; measured: SSIM .9949, PSNR 40.0 dB at least."""
+    pytest.importorskip("pyvista")
+    looks = {**TRANSFER_FUNCTIONS["soft"], "interpolation": way}
+    volume = pvdi.examples.load_data(name, as_volume=True)
+    report, _, _ = measure(volume, looks, (320, 180), repeats=0)
+    for view in report["views"]:
+        assert view["near"]["raycaster_to_gpu"]["ssim"] >= 0.99, view["angle"]
+        assert view["near"]["raycaster_to_gpu"]["psnr"] >= 38.0, view["angle"]

@@ -6,16 +6,12 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import cli
-from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.measure.tradeoff import (
     COSTS,
     Point,
-    Tradeoff,
     dominates,
     measure_tradeoff,
     sweep,
@@ -34,44 +30,38 @@ def shell():
     return pvdi.Volume(values), pvdi.TransferFunction(np.stack([ramp] * 3, 1), ramp, (0, 255))
 
 
-def point(cost, ssim, noise=0.0, **setting):
+def point(cost, ssim, **setting):
     costs = dict.fromkeys(COSTS, 1.0) | {"frame": cost}
-    return Point(setting, costs, {"frame": noise, "generation": noise}, {0: cost}, {0: ssim})
+    return Point(setting, costs, {0: cost}, {0: ssim})
 
 
 def test_a_tiny_run_measures_what_each_setting_costs_and_gives(shell, default_runtime):
-    pytest.importorskip("matplotlib")
     volume, look = shell
-    settings = sweep({"max_supersegments": (2,), "precision": ("8-byte",), "preview": (0.5,)})
+    settings = sweep({"max_supersegments": (2,), "precision": ("8-byte",)})
     found = measure_tradeoff(volume, settings, transfer_function=look, **TINY)
-    whole, short, packed, preview = found.points
+    whole, short, packed = found.points
     assert [one.name for one in found.points[:2]] == ["default", "max_supersegments 2"]
     assert min(whole.ssims[0], packed.ssims[0]) > 0.999  # from V_O nothing is lost
     assert short.ssims[30] < whole.ssims[30] + 0.001
-    assert preview.ssim < whole.ssim
-    assert short.costs["memory"] < whole.costs["memory"] == preview.costs["memory"]
+    assert short.costs["memory"] < whole.costs["memory"]
     assert packed.costs["memory"] < 0.6 * whole.costs["memory"]
     assert packed.costs["file"] < whole.costs["file"]
     assert all(cost > 0 for one in found.points for cost in one.costs.values())
     assert found.front("memory")[0] in ("max_supersegments 2", "precision 8-byte")
-    with pytest.raises(InvalidArgumentError, match="kind must be one of frame, memory"):
-        found.front("price")
     table = found.table()
     assert all(f"| {one.name} |" in table for one in found.points)
-    assert len(found.plot().axes) == len(COSTS)
 
 
-def test_the_command_writes_figures_a_table_and_a_plot(shell, tmp_path, capsys, default_runtime):
-    pytest.importorskip("matplotlib")
+def test_the_command_writes_figures_and_a_table(shell, tmp_path, capsys, default_runtime):
     np.save(tmp_path / "ball.npy", shell[0].array)
     run = ["tradeoff", str(tmp_path / "ball.npy"), "--size", "32x24", "--angles", "0,30"]
     run += ["--repeats", "1", "--generations", "1", "--no-vtk", "--out", str(tmp_path / "out")]
-    assert cli.main([*run, "--sweep", "max-supersegments=2,3", "skip-empty"]) == 0
+    assert cli.main([*run, "--sweep", "max-supersegments=2,3", "lists=0.5"]) == 0
     found = json.loads((tmp_path / "out" / "tradeoff-ball.json").read_text(encoding="utf-8"))
-    settings = [{}, *({"max_supersegments": n} for n in (2, 3)), {"skip_empty": False}]
+    settings = [{}, *({"max_supersegments": n} for n in (2, 3)), {"lists": 0.5}]
     assert [one["setting"] for one in found["points"]] == settings
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {f"tradeoff-ball.{kind}" for kind in ("json", "md", "png")}
+    assert names == {f"tradeoff-ball.{kind}" for kind in ("json", "md")}
     assert "memory against SSIM: " in capsys.readouterr().out
     assert cli.main([*run, "--sweep", "sides=2"]) == 1
     assert "--sweep knows no 'sides'" in capsys.readouterr().err
@@ -79,18 +69,9 @@ def test_the_command_writes_figures_a_table_and_a_plot(shell, tmp_path, capsys, 
     assert "--sweep lists takes numbers; got 'many'" in capsys.readouterr().err
 
 
-def test_noise_is_not_taken_for_dominance():
+def test_a_setting_dominates_that_is_better_and_nowhere_worse():
     slow, fast = point(1.0, 0.98), point(0.8, 0.98)
     assert dominates(fast, slow)
     assert not dominates(slow, fast)
-    # Faster by a fifth, but repetitions differ by as much
-    assert not dominates(point(0.8, 0.98, noise=0.2), slow)
     # Faster, and worse by more than what does not count
     assert not dominates(point(0.8, 0.979), slow)
-
-
-@given(st.lists(st.tuples(st.floats(0.1, 10), st.floats(0.5, 1)), min_size=2, max_size=7))
-def test_no_settings_give_way_to_each_other_in_turn(figures):
-    """Something is always on the front."""
-    points = [point(cost, ssim, tolerance=k) for k, (cost, ssim) in enumerate(figures)]
-    assert Tradeoff({}, points, {}).front("frame")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import itertools
 import warnings
 
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidVDIError, UnsupportedError, VDIWarning
+from pyvista_vdi.errors import UnsupportedError, VDIWarning
 
 pv = pytest.importorskip("pyvista")
 
@@ -55,34 +54,6 @@ def test_changes_of_property_and_table_are_seen_and_nothing_is_generated(
         assert np.abs(before - after).mean() > 0.2
 
 
-def test_another_transfer_function_uploads_its_table_alone(default_runtime, plotter, monkeypatch):
-    """No list is generated, made on the host or uploaded, and the device holds no byte more."""
-    actor = plotter.add_vdi(volume(), classification="deferred", show_scalar_bar=False)
-    uploaded, upload = [], type(default_runtime).upload
-    monkeypatch.setattr("pyvista_vdi.generation.deferred.generate_vdi", None)
-    monkeypatch.setattr(
-        type(default_runtime),
-        "upload",
-        lambda *given: uploaded.append(given[2]) or upload(*given),
-    )
-    first = seen(plotter)
-    assert {"front depths", "means of values"} <= set(uploaded)
-    gc.collect()  # what other tests have left would go meanwhile
-    held = default_runtime.allocated
-    for low in (50, 100, 150):
-        uploaded.clear()
-        opacity = actor.prop.GetScalarOpacity()
-        opacity.RemoveAllPoints()
-        opacity.AddPoint(low, 0)
-        opacity.AddPoint(255, 0.3)
-        assert np.abs(seen(plotter) - first).mean() > 0.2
-        assert uploaded.count("integrals of a transfer function") == 1
-        assert set(uploaded) <= {"integrals of a transfer function", "rays", "opaque depth"}
-        assert "offsets" not in vars(actor.vdi)
-        gc.collect()
-        assert default_runtime.allocated <= held
-
-
 def test_a_file_takes_a_look_and_its_picture_is_that_of_the_classified_vdi(
     default_runtime, plotter, tmp_path
 ):
@@ -96,21 +67,6 @@ def test_a_file_takes_a_look_and_its_picture_is_that_of_the_classified_vdi(
     plotter.remove_actor(actor)
     plotter.add_vdi(kept.classified(**look), show_scalar_bar=False)
     assert np.abs(picture - seen(plotter)).max() <= 1
-
-
-@pytest.mark.parametrize(
-    ("asked", "error", "says"),
-    [
-        ({"shade": True}, UnsupportedError, "shade=True needs the volume's gradients"),
-        ({"categories": True}, UnsupportedError, "categories are of single values"),
-        ({"max_supersegments": 5}, UnsupportedError, "max_supersegments"),
-    ],
-)
-def test_what_values_cannot_honour_is_refused(default_runtime, plotter, asked, error, says):
-    kept = pvdi.generate(volume(), plotter.camera, (48, 36), classification="deferred")
-    with pytest.raises(error, match=says):
-        plotter.add_vdi(kept, **asked)
-    assert not plotter.renderer.actors
 
 
 @pytest.mark.parametrize(
@@ -151,19 +107,6 @@ def test_what_is_shown_but_not_kept_is_warned_of_once(default_runtime, plotter, 
     ]
 
 
-@pytest.mark.extension("series")
-def test_what_is_kept_cannot_be_said_of_a_vdi_nor_values_be_set_as_one(default_runtime, plotter):
-    kept = pvdi.generate(volume(), plotter.camera, (48, 36), classification="deferred")
-    colours = kept.classified(cmap="bone")
-    for vdi in (kept, colours, pvdi.VDISeries([kept])):
-        with pytest.raises(UnsupportedError, match="classification cannot be given with a VDI"):
-            plotter.add_vdi(vdi, classification="deferred")
-    actor = plotter.add_vdi(colours)
-    with pytest.raises(InvalidVDIError, match=r"vdi\.classified\(.*plotter\.add_vdi\(vdi, cmap"):
-        actor.vdi = kept
-    assert actor.vdi is colours
-
-
 def test_shading_that_is_switched_on_later_is_warned_of_and_left_out(default_runtime, plotter):
     actor = plotter.add_vdi(volume(), classification="deferred", show_scalar_bar=False)
     before = seen(plotter)
@@ -173,12 +116,6 @@ def test_shading_that_is_switched_on_later_is_warned_of_and_left_out(default_run
     assert np.array_equal(before, after)
     actor.prop.GetScalarOpacity().AddPoint(100, 1.0)  # is seen all the same, and nothing is said
     assert np.abs(seen(plotter) - before).mean() > 0.2
-
-
-def test_a_mapper_names_the_remedy(default_runtime, plotter):
-    kept = pvdi.generate(volume(), plotter.camera, (48, 36), classification="deferred")
-    with pytest.raises(InvalidVDIError, match="classified"):
-        pvdi.VDIMapper().SetInputData(kept)
 
 
 def test_picks_and_the_vdi_have_the_look_of_now(default_runtime, plotter):

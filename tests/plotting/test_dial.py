@@ -6,14 +6,11 @@ import pytest
 from plugin_scenes import LOOKS, soft_ball
 from settings import with_settings
 from vtk_sources import SIZE, executions, ready_source, some_property
-from watched_windows import finish, small_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
+from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
 from pyvista_vdi.model.options import QualityTarget
-from pyvista_vdi.quality.background import BackgroundThread, vdi_job
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
-from pyvista_vdi.quality.targets import LADDER
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
 
@@ -43,22 +40,6 @@ def test_the_status_says_what_was_chosen_and_is_predicted(plotter):
     assert actor.status.dial["asked"] == {"quality": "balanced"}
 
 
-def test_without_a_dial_nothing_is_chosen(plotter):
-    actor = shown(plotter)
-    assert actor.status.dial is None
-    assert "chosen" not in str(actor.status)
-    plain = actor.vdi
-    plotter.remove_actor(actor)
-    assert shown(plotter, quality="reference").vdi.equals(plain)
-
-
-def test_precision_and_limits_reach_the_vdi(plotter):
-    assert shown(plotter, precision="8-byte").vdi.precision == "8-byte"
-    with pytest.warns(VDIWarning, match=r"1e\+09 full frames per second cannot be reached"):
-        actor = shown(plotter, full_fps=1e9, name="fast")
-    assert actor.vdi.metadata["max_supersegments"] == LADDER[0].max_supersegments
-
-
 @pytest.mark.parametrize(
     ("arguments", "bound"),
     [
@@ -72,26 +53,6 @@ def test_precision_and_limits_reach_the_vdi(plotter):
 def test_views_regenerate_below_what_was_asked_for(plotter, arguments, bound):
     actor = plotter.add_vdi(soft_ball(12), render=False, **arguments)
     assert actor.mapper.GetRegenerateBelow() == pytest.approx(bound)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ({"quality": "best"}, "quality must be one of"),
-        ({"quality": "fast", "target_ssim": 0.9}, "give one of them"),
-        ({"quality": "fast", "max_supersegments": 9}, "max_supersegments=9"),
-        ({"full_fps": -1}, "full_fps must be"),
-        ({"precision": "half"}, "precision must be .exact. or .8-byte."),
-    ],
-)
-def test_what_contradicts_is_refused_when_it_is_added(plotter, arguments, said):
-    with pytest.raises(InvalidArgumentError, match=said):
-        plotter.add_vdi(soft_ball(12), **arguments)
-
-
-def test_a_vdi_has_nothing_to_choose(plotter):
-    with pytest.raises(UnsupportedError, match="quality cannot be given with a VDI"):
-        plotter.add_vdi(small_vdi(), quality="fast")
 
 
 def test_a_source_makes_what_generate_makes():
@@ -141,15 +102,3 @@ def test_what_is_behind_a_source_sees_the_window_that_was_chosen(asked, recwarn)
     counted = executions(source)
     picture.Update()
     assert not counted
-
-
-def test_what_is_made_in_the_background_is_chosen_there():
-    source = ready_source()
-    source.SetDial("balanced")
-    request = source.MakeRequest()
-    background = BackgroundThread("pyvista-vdi generation")
-    background.put(vdi_job(request.generation, request.target))
-    finish()
-    made = background.take()
-    assert made.equals(source.GetVDI())
-    assert made.metadata["dial"]["asked"] == {"quality": "balanced"}

@@ -117,21 +117,6 @@ def test_colours_are_those_of_a_map_or_a_preset_and_of_the_scalar_bar(plotter, a
         assert got[:, 1:] == pytest.approx(want[:, 1:])  # over the values that there are
 
 
-def test_changes_from_elsewhere_are_shown(plotter):
-    actor = plotter.add_volume(soft_ball(), **LOOKS)
-    editor = plotter.vdi.add_transfer_function_editor(actor)
-    plotter.show(auto_close=False)
-    assert len(editor.points) == 32  # of 256, as PyVista makes them
-    prop = pv.VolumeProperty()
-    prop.SetColor(pv.LookupTable("viridis", scalar_range=(50, 90)).to_color_tf())
-    prop.GetScalarOpacity().RemoveAllPoints()
-    prop.GetScalarOpacity().AddPoint(60, 0.4)
-    prop.GetScalarOpacity().AddPoint(80, 0.5)
-    actor.prop = prop
-    plotter.render()
-    assert editor.points.tolist() == [[60, 0.4], [80, 0.5]]
-
-
 @pytest.mark.parametrize("add", ["add_volume", "add_vdi"])
 def test_it_goes_by_name_or_with_its_actor_and_nothing_stays(add, no_leaks):
     plotter = pv.Plotter(window_size=WINDOW)

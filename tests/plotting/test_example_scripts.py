@@ -7,15 +7,12 @@ import runpy
 import subprocess
 import sys
 from io import BytesIO
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 from skimage.io import imread
-
-import pyvista_vdi as pvdi
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -116,24 +113,19 @@ def test_side_by_side_example_writes_an_animation_of_both(tmp_path):
 
 
 @pytest.mark.slow
-def test_series_example_writes_a_movie_of_its_steps(tmp_path):
-    said, target = run_example("series.py", tmp_path)
-    assert "series.vdis: 12 steps" in said
-    assert len(pvdi.read(target.with_suffix(".vdis"))) == 12
-    frames, size = gif(target)
-    assert (size, len(frames)) == ((480, 360), 12)
-    dark = [(frames[k].mean(axis=2) < 128).mean() for k in (0, 4, 8)]
-    assert all(later > 1.2 * before for before, later in pairwise(dark)), "it has not risen"
-
-
-@pytest.mark.slow
-def test_sets_example_writes_a_movie_of_a_turn(tmp_path):
-    said, target = run_example("sets.py", tmp_path)
-    assert "sets.vdiset: 32 VDIs" in said
-    frames, size = gif(target)
-    assert (size, len(frames)) == ((200, 150), 24)
-    for k in (0, 7, 12, 23):  # from every side there is a knot
-        assert 0.02 < (frames[k].mean(axis=2) < 128).mean() < 0.5
+@pytest.mark.parametrize(
+    ("name", "told", "size", "count"),
+    [
+        ("series.py", "series.vdis: 12 steps", (480, 360), 12),
+        ("sets.py", "sets.vdiset: 32 VDIs", (200, 150), 24),
+    ],
+)
+def test_example_writes_a_movie(name, told, size, count, tmp_path):
+    said, target = run_example(name, tmp_path)
+    assert told in said
+    frames, found = gif(target)
+    assert (found, len(frames)) == (size, count)
+    assert np.abs(frames[count // 2] - frames[0]).mean() > 2
 
 
 def test_a_page_is_written(tmp_path):
@@ -151,7 +143,6 @@ def scripts():
 
 
 @documented
-@pytest.mark.every(3)
 @pytest.mark.parametrize("name", [*scripts()])
 def test_a_script_of_the_gallery_writes_its_picture(name, tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "agg")
@@ -165,15 +156,3 @@ def test_a_script_of_the_gallery_writes_its_picture(name, tmp_path, monkeypatch)
     assert written.shape == kept.shape
     # The same where it was made; fonts, drivers and devices differ in few pixels
     assert np.abs(written - kept).mean() < 1
-
-
-@documented
-def test_every_script_of_the_gallery_has_its_picture_and_says_what_it_is():
-    found = sorted(GALLERY.glob("*.py"))
-    assert 6 <= len(found) <= 12
-    for script in found:
-        text = script.read_text(encoding="utf-8")
-        name = f"gallery-{script.stem}.jpg"
-        assert f".. image:: /images/{name}\n   :alt: " in text
-        assert f"sphinx_gallery_thumbnail_path = 'images/{name}'" in text
-        assert (CHECKOUT / "docs" / "images" / name).stat().st_size <= 150 * 1024

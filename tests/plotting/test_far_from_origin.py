@@ -7,9 +7,6 @@ import pytest
 import pyvista as pv
 from plugin_scenes import shown
 
-import pyvista_vdi as pvdi
-from pyvista_vdi.vtk_pipeline.vtk import vtkPropPicker
-
 pytestmark = pytest.mark.gl
 
 WINDOW = (120, 90)
@@ -122,35 +119,3 @@ def test_the_picture_is_that_at_the_origin(scene):
         most, mean = (20, 0.04) if distance == FAR[-1] else (4, 0.01)
         assert off.max() <= most, distance
         assert off.mean() < mean, distance
-
-
-@pytest.mark.parametrize("lens", [{}, {"parallel_projection": True, "parallel_scale": 0.8}])
-def test_the_engine_s_pictures_are_those_at_the_origin(lens):
-    def pictures(at):
-        views = [pvdi.Camera(at + eye, at, (0, 0, 1), **lens) for eye in (EYE, EYE + 0.25)]
-        looks = {"clim": (0, 255), "opacity": [0.2, 0.7]}
-        vdi = pvdi.generate(block(at), views[0], WINDOW, **looks)
-        volume = pvdi.render_volume(block(at), views[0], WINDOW, **looks)
-        return [volume, *(pvdi.render(vdi, view) for view in views)]
-
-    near = pictures(np.zeros(3))
-    for distance in FAR:
-        far = pictures(np.array([0.5, -0.75, 0.25]) * distance)
-        # As above, in parts of 1
-        assert max(np.abs(a - b).max() for a, b in zip(far, near, strict=True)) < 0.08
-        assert max(np.abs(a - b).mean() for a, b in zip(far, near, strict=True)) < 2e-4
-
-
-@pytest.mark.parametrize("distance", [0, *FAR])
-def test_picks_are_where_the_volume_is(plotter, distance):
-    at = np.array([0.5, -0.75, 0.25]) * distance
-    actor = plain(plotter, at)
-    shown(plotter)
-    middle = plotter.window_size[0] / 2, plotter.window_size[1] / 2
-    picker = vtkPropPicker()
-    assert picker.PickProp(*middle, plotter.renderer) == 1
-    assert picker.GetViewProp() is actor
-    assert picker.PickProp(1, 1, plotter.renderer) == 0
-    position = np.array(actor.pick(*middle).position) - at
-    assert np.abs(position).max() < 0.6
-    np.testing.assert_allclose(np.array(actor.bounds), np.array(block(at).bounds), rtol=1e-15)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-import warnings
-
 import numpy as np
 import pytest
 import pyvista as pv
@@ -15,7 +12,7 @@ from plugin_scenes import (
 )
 from pyvista.plotting.plotter import _ALL_PLOTTERS
 
-from pyvista_vdi.errors import UnsupportedError, VDIWarning
+from pyvista_vdi.errors import UnsupportedError
 
 pytestmark = pytest.mark.gl
 
@@ -52,7 +49,7 @@ def test_blocks_within_blocks_and_none(plotter):
     assert [isinstance(each, list) for each in actors] == [True, False]
     assert plotter.add_vdi(pv.MultiBlock()) == []
     before = len(plotter.renderer.actors)
-    with pytest.raises(UnsupportedError, match="a surface has no volume"):
+    with pytest.raises(UnsupportedError, match="voxelise a surface"):
         plotter.add_vdi(pv.MultiBlock([soft_ball(8), pv.MultiBlock([pv.Sphere()])]))
     assert len(plotter.renderer.actors) == before, "nothing, or all"
 
@@ -73,16 +70,6 @@ def test_a_rectilinear_grid_of_equidistant_points_is_the_uniform_grid(plotter, d
     axis[3] += 0.001
     with pytest.raises(UnsupportedError, match=r"not a uniform grid.*resample"):
         plotter.add_vdi(pv.RectilinearGrid(axis, axis, axis))
-
-
-def test_names_of_vtk_s_mappers_mean_nothing_and_are_noted(plotter):
-    with pytest.warns(VDIWarning, match="mapper='gpu' chooses among VTK's.*is ignored"):
-        plotter.add_vdi(soft_ball(8), mapper="gpu", multi_colors=True, name="it", **LOOKS)
-    named = shown(plotter)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        plotter.add_vdi(soft_ball(8), name="it", **LOOKS)
-    np.testing.assert_array_equal(shown(plotter), named)
 
 
 def test_plot_of_a_grid_is_what_a_plotter_shows(plotter):
@@ -115,10 +102,3 @@ def test_a_plot_that_is_refused_leaves_no_plotter():
     with pytest.raises(TypeError, match="'opcity': did you mean 'opacity'"):
         soft_ball(8).vdi.plot(off_screen=True, opcity=1)
     assert before == _ALL_PLOTTERS
-
-
-def test_help_is_the_method_s(plotter):
-    for found in (plotter.add_vdi, type(plotter).add_vdi):
-        assert inspect.getdoc(found).startswith("Add a volume that turns fluently")
-        assert "max_supersegments : int" in inspect.getdoc(found)
-    assert next(iter(inspect.signature(plotter.add_vdi).parameters)) == "volume"

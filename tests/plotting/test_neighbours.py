@@ -25,9 +25,6 @@ from pyvista import Plotter
 
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkAssembly,
-    # Before any widget: else PyVista 0.49's pv.Spline fails once a spline widget was added
-    vtkCommonComputationalGeometry,  # noqa: F401
-    vtkPlane,
     vtkPropAssembly,
 )
 
@@ -36,137 +33,15 @@ pytestmark = pytest.mark.gl
 WINDOW = (120, 100)
 VIEW = ((4.5, 4.0, 3.0), (0.2, 0.0, 0.0), (0.0, 0.0, 1.0))
 
-Add = Callable[[Plotter], object]
-
 
 def beside() -> pv.PolyData:
     """A mesh whose half is inside the ball."""
     return pv.Sphere(radius=0.5, center=(0.5, 0.7, 0.5), theta_resolution=12, phi_resolution=12)
 
 
-def checks() -> pv.Texture:
-    squares = np.indices((16, 16)).sum(axis=0) % 2 * 255
-    return pv.Texture(np.repeat(squares[..., np.newaxis], 3, axis=2).astype(np.uint8))
-
-
-def sky() -> pv.Texture:
-    """A cube map of six plain colours."""
-    texture = pv.Texture()
-    texture.SetMipmap(True)
-    texture.SetInterpolate(True)
-    texture.cube_map = True
-    for face, color in enumerate(np.eye(6, 3) * 120 + 100):
-        image = pv.ImageData(dimensions=(8, 8, 1))
-        image["color"] = np.tile(color, (64, 1)).astype(np.uint8)
-        texture.SetInputDataObject(face, image)
-    return texture
-
-
-def lit_by_the_sky(plotter: Plotter) -> None:
-    plotter.set_environment_texture(sky(), is_srgb=True)
-    plotter.renderer.GetEnvMapPrefiltered().SetPrefilterLevels(3)  # of 8 x 8 texels
-    plotter.renderer.GetEnvMapPrefiltered().SetPrefilterMaxSamples(8)
-    plotter.renderer.GetEnvMapIrradiance().SetIrradianceSize(8)
-    plotter.renderer.GetEnvMapIrradiance().SetIrradianceStep(0.5)
-    plotter.renderer.GetEnvMapLookupTable().SetLUTSize(16)
-    plotter.renderer.GetEnvMapLookupTable().SetLUTSamples(8)
-    plotter.add_mesh(beside(), pbr=True, metallic=0.8, roughness=0.2, color="w")
-
-
-def textured(plotter: Plotter) -> None:
-    mesh = pv.Plane(center=(0.4, 0.5, 0.2), direction=(1, 0.6, 0.3), i_size=2, j_size=2)
-    plotter.add_mesh(mesh, texture=checks())
-
-
-def charted(plotter: Plotter) -> None:
-    chart = pv.Chart2D(size=(0.4, 0.4), loc=(0.0, 0.6))
-    chart.line([0, 1, 2], [2, 1, 3])
-    plotter.add_chart(chart)
-
-
-def blocks(plotter: Plotter) -> None:
-    cube = pv.Cube(center=(0.9, -0.4, 0.3), x_length=0.7, y_length=0.7, z_length=0.7)
-    plotter.add_mesh(pv.MultiBlock({"ball": beside(), "cube": cube}), multi_colors=True)
-
-
-def tubes(plotter: Plotter) -> None:
-    t = np.linspace(0, 6, 20)
-    line = pv.Spline(np.column_stack([np.cos(t), np.sin(t), t / 4 - 0.7]), 20)
-    plotter.add_mesh(line, color="k", line_width=3, render_lines_as_tubes=True)
-
-
-def labels(plotter: Plotter) -> None:
-    corners = pv.PolyData([[0.9, 0.5, 0.5], [0.2, 0.9, 0.8], [-0.8, 0.4, 0.9]])
-    plotter.add_point_labels(corners, ["a", "b", "c"], font_size=8)
-
-
-#: What a plotter can add, or switch on, that VTK's own volume is right beside.
-KINDS: dict[str, Add] = {
-    "texture": textured,
-    "multi-block": blocks,
-    "environment": lit_by_the_sky,
-    "skybox": lambda p: p.add_actor(sky().to_skybox()),
-    "gaussians": lambda p: p.add_mesh(beside(), style="points_gaussian", point_size=6),
-    "tubes": tubes,
-    "point labels": labels,
-    "chart": charted,
-    "plane widget": lambda p: p.add_plane_widget(lambda *_: None),
-}
-#: Likewise, and at night.
-MORE: dict[str, Add] = {
-    "vertices": lambda p: p.add_mesh(beside(), show_vertices=True),
-    "cursor": lambda p: p.add_cursor(bounds=(-1, 1, -1, 1, -1, 1)),
-    "box widget": lambda p: p.add_box_widget(lambda *_: None),
-    "slider": lambda p: p.add_slider_widget(lambda *_: None, (0, 1)),
-    "line widget": lambda p: p.add_line_widget(lambda *_: None),
-    "sphere widget": lambda p: p.add_sphere_widget(lambda *_: None, radius=0.6),
-    "spline widget": lambda p: p.add_spline_widget(lambda *_: None),
-    "button": lambda p: p.add_checkbox_button_widget(lambda *_: None, size=20),
-    "clip plane of a mesh": lambda p: p.add_mesh_clip_plane(beside()),
-    "measurement": lambda p: p.add_measurement_widget(),
-}
-
-#: Pixels in which a mesh itself differs: points and lines at the window's very last bits.
-STRAYS = 6
-
-
-def picture(kind: Add, add: Callable[..., object], *, later: bool = False) -> np.ndarray:
-    """Draw a scene; ``later``: the neighbour comes when the volume has been drawn."""
-    plotter = pv.Plotter(window_size=WINDOW)
-    plotter.set_background("lightsteelblue")
-    if later:
-        add(plotter, soft_ball(16))
-        plotter.camera_position = VIEW
-        plotter.show(auto_close=False)
-        kind(plotter)
-    else:
-        kind(plotter)
-        add(plotter, soft_ball(16), reset_camera=False)
-    plotter.camera_position = VIEW
-    plotter.camera.parallel_scale = 1.8
-    plotter.show(auto_close=False)
-    image = plotter.screenshot(return_img=True)[..., :3].astype(int)
-    plotter.close()
-    return image
-
-
-@pytest.mark.every(3)
 @pytest.mark.parametrize(
-    "name", [*KINDS, *(pytest.param(name, marks=pytest.mark.slow) for name in MORE)]
+    ("kind", "how"), [(vtkPropAssembly, "one"), (vtkPropAssembly, "nested"), (vtkAssembly, "two")]
 )
-def test_a_vdi_beside_it_is_drawn_as_a_volume_is(name):
-    kind = {**KINDS, **MORE}[name]
-    judge = picture(kind, add_judge)
-    assert np.abs(judge - picture(kind, add_nothing)).max() > 40, "VTK's volume is not seen"
-    for later in (False, True):
-        off = np.abs(picture(kind, add_ours, later=later) - judge).max(axis=-1)
-        count = np.count_nonzero(off > TOLERANCE)
-        assert count <= STRAYS, f"later={later}: {count} pixels are off by up to {off.max()}"
-
-
-@pytest.mark.every(2)
-@pytest.mark.parametrize("kind", [vtkPropAssembly, vtkAssembly])
-@pytest.mark.parametrize("how", ["one", "nested", "two"])
 def test_parts_of_an_assembly_are_drawn(kind, how):
     """All of them, and what they end at: the assembly is not asked while it walks its parts."""
 
@@ -231,42 +106,3 @@ def test_shadows_are_drawn_as_over_a_volume():
     judge = seen_under(Plotter.enable_shadows, add_judge)
     ours = seen_under(Plotter.enable_shadows, add_ours)
     assert np.abs(ours - judge).max() <= TOLERANCE
-
-
-def test_a_mapper_s_data_set_is_what_was_added():
-    ball = soft_ball(16)
-    plotter = pv.Plotter(window_size=WINDOW)
-    actor = add_ours(plotter, ball)
-    assert actor.mapper.dataset.dimensions == ball.dimensions
-    np.testing.assert_array_equal(actor.mapper.dataset["v"], ball["v"])
-    vdi = actor.regenerate()
-    alone = plotter.add_vdi(vdi)
-    assert alone.mapper.dataset.bounds == pytest.approx(ball.bounds)
-    other = ball.copy()
-    other["v"] = ball["v"][::-1].copy()
-    actor.mapper.dataset = other
-    assert not actor.regenerate().equals(vdi)
-
-
-@pytest.mark.parametrize("of", ["mapper", "actor"])
-def test_a_copy_of_the_mapper_draws_the_same_behind_another_actor(of):
-    plotter = pv.Plotter(window_size=WINDOW)
-    plotter.set_background("lightsteelblue")
-    actor = add_ours(plotter, soft_ball(16))
-    plane = vtkPlane()
-    plane.SetNormal(1, 0.3, 0)
-    actor.mapper.AddClippingPlane(plane)
-    actor.mapper.SetCroppingRegionPlanes(-0.45, 0.3, -0.2, 0.5, -0.4, 0.25)
-    actor.mapper.SetCroppingRegionFlagsToFence()
-    actor.mapper.CroppingOn()
-    actor.opacity_multiplier = 2.0
-    plotter.camera_position = VIEW
-    before = plotter.screenshot(return_img=True)
-    other = actor.copy() if of == "actor" else type(actor)()
-    if of == "mapper":
-        other.mapper = actor.mapper.copy()
-    assert other.opacity_multiplier == other.mapper.GetOpacityMultiplier() == 2.0
-    assert other.mapper.scalar_range == actor.mapper.scalar_range
-    plotter.remove_actor(actor)
-    plotter.add_actor(other, reset_camera=False)
-    np.testing.assert_array_equal(plotter.screenshot(return_img=True), before)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError
 
-pv = pytest.importorskip("pyvista")
+pytest.importorskip("pyvista")
 
 HOUNSFIELD = np.linspace(-1000, 2000, 3001)
 
@@ -51,16 +50,3 @@ def test_the_name_is_a_colour_map_of_the_same_look(name):
     given = Looks(cmap=name, clim=(0, 5), opacity="sigmoid").lookup_table(HOUNSFIELD)
     assert given.scalar_range == (0, 5)
     assert not np.array_equal(given.values[:, 3], one.values[:, 3])
-
-
-def test_add_volume_takes_a_preset():
-    plotter = pv.Plotter(off_screen=True, window_size=(32, 24))
-    actor = plotter.add_volume(pv.Wavelet(), **pvdi.presets["mri-skin"])
-    assert actor.prop.shade
-
-
-def test_unknown_names():
-    with pytest.raises(InvalidArgumentError, match="did you mean 'ct-bone'"):
-        pvdi.presets["ct-bones"]
-    assert "ct-bones" not in pvdi.presets
-    assert len(repr(pvdi.presets).splitlines()) == len(pvdi.presets)

@@ -11,7 +11,7 @@ from extension_marks import cases
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIFileError
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image, vdi_to_image
 
 
@@ -60,21 +60,3 @@ def test_what_is_no_vdi_is_not_saved_as_one(name, tmp_path):
     with pytest.raises(InvalidVDIError, match="PolyData that holds no VDI"):
         pv.Sphere().save(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.extension("deep_exr")
-def test_a_file_that_is_no_deep_image_is_refused(tmp_path):
-    (tmp_path / "a.exr").write_bytes(b"something else")
-    with pytest.raises(VDIFileError, match=r"a\.exr"):
-        pv.read(tmp_path / "a.exr")
-
-
-@pytest.mark.extension("series")  # whose entry point would be broken
-def test_nothing_of_pyvista_is_shadowed():
-    written = {".exr", ".vdi"}
-    ours = {*written, ".vdis"}
-    for registered, theirs in ((pv.registered_readers(), ours), (pv.registered_writers(), written)):
-        found = {each.extension for each in registered if "pyvista_vdi" in each.source}
-        assert found == theirs
-    assert not ours & set(pv.ImageData._WRITERS)
-    assert not ours & set(pv.core.utilities.reader.CLASS_READERS)

@@ -10,9 +10,9 @@ import pyvista as pv
 from strategies import random_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import cli, registry
+from pyvista_vdi import registry
 from pyvista_vdi.cli.inputs import read_volume
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
+from pyvista_vdi.errors import InvalidVolumeError
 
 SPACING, ORIGIN = np.array([1.0, 1.5, 2.5]), np.array([-10.0, 20.0, 30.0])
 SCAN = (np.arange(210).reshape(5, 6, 7) * 7 % 211).astype(np.int16)
@@ -72,20 +72,6 @@ def test_one_array_of_several_and_cells(tmp_path, default_runtime):
     assert [each.name for each in pvdi.list_volumes(tmp_path / "a.vti")] == ["c", "cell:c"]
 
 
-def test_what_is_no_uniform_grid_of_scalars_is_refused(tmp_path):
-    rectilinear(0.5).save(tmp_path / "a.vtr")
-    with pytest.raises(UnsupportedError, match=r"a\.vtr: RectilinearGrid is not a uniform grid"):
-        read(tmp_path / "a.vtr")
-    image = pv.ImageData(dimensions=(6, 5, 4))
-    image.save(tmp_path / "b.vti")
-    with pytest.raises(InvalidVolumeError, match=r"b\.vti holds no volume"):
-        read(tmp_path / "b.vti")
-    image["velocity"] = np.zeros((120, 3), np.float32)
-    image.save(tmp_path / "c.vti")
-    with pytest.raises(UnsupportedError, match=r"'velocity' have 3 components: .*one component"):
-        read(tmp_path / "c.vti")
-
-
 @pytest.mark.parametrize("name", ["a.vtk", "a.vti", "a.vtr"])
 def test_what_is_cut_off_is_refused(name, tmp_path, capfd):
     (rectilinear() if name == "a.vtr" else grid()).save(tmp_path / name)
@@ -108,25 +94,25 @@ def test_a_vdi_is_no_volume(tmp_path):
         read(tmp_path / "a.vti")
 
 
-def test_pictures_of_two_formats_are_the_same(tmp_path, capsys, default_runtime):
-    """Through the subcommands: generate from the file, render from the side."""
-    from PIL import Image
-
-    nrrd = pytest.importorskip("nrrd")
-    grid(turned()).save(tmp_path / "a.vti")
-    header = {"space": "left-posterior-superior", "space origin": ORIGIN}
-    header["space directions"] = (turned() * SPACING).T
-    nrrd.write(str(tmp_path / "a.nrrd"), SCAN, header, index_order="C")
-    pictures = []
-    looks = ("--cmap", "bone", "--opacity", "0,0.6", "--clim", "0", "210", "--size", "48x36")
-    for volume in ("a.vti", "a.nrrd"):
-        vdi, png = str(tmp_path / "a.vdi"), str(tmp_path / "a.png")
-        arguments = ["generate", str(tmp_path / volume), "-o", vdi, *looks]
-        assert cli.main([*arguments, "--interpolation", "linear"]) == 0, capsys.readouterr().err
-        arguments = ["render", vdi, "-o", png, "--azimuth", "10", "--background", "black"]
-        assert cli.main(arguments) == 0, capsys.readouterr().err
-        with Image.open(png) as image:
-            pictures.append(np.asarray(image).astype(int))
-    assert pictures[0].max() > 60
-    # Coordinates differ by float32's rounding, rays at faces may take another voxel: seen up to 1
-    assert np.abs(pictures[0] - pictures[1]).max() <= 2
+@pytest.mark.gl
+@pytest.mark.parametrize(("distance", "points"), [(4000, 8), (60, 32)])
+def test_a_store_is_shown_at_the_level_of_the_view(distance, points, tmp_path, default_runtime):
+    zarr = pytest.importorskip("zarr")
+    group, values = zarr.open_group(tmp_path, mode="w", zarr_format=2), np.ones((32,) * 3, "u1")
+    levels = [(str(k), step) for k, step in enumerate((1, 2, 4))]
+    for path, step in levels:
+        group.create_array(path, data=values[::step, ::step, ::step])
+    scales = [{"type": "scale", "scale": [float(step)] * 3} for _, step in levels]
+    sets = [
+        {"path": path, "coordinateTransformations": [scale]}
+        for (path, _), scale in zip(levels, scales, strict=True)
+    ]
+    axes = [{"name": name, "type": "space"} for name in "zyx"]
+    group.attrs["multiscales"] = [{"version": "0.4", "datasets": sets, "axes": axes}]
+    plotter = pv.Plotter(off_screen=True, window_size=(64, 48))
+    plotter.camera_position = ((16, 16, distance), (16, 16, 16), (0, 1, 0))
+    actor = plotter.add_vdi(pvdi.read_volume(tmp_path), clim=(0, 2))
+    assert actor.mapper.dataset.dimensions == (points,) * 3
+    # Opacities are of the finest level's voxels
+    assert actor.prop.opacity_unit_distance == pytest.approx(3**0.5, rel=0.05)
+    plotter.close()

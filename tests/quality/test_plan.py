@@ -10,7 +10,7 @@ import pytest
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.view import View
 from pyvista_vdi.quality.costs import Costs
-from pyvista_vdi.quality.plan import Made, Making, Plan, Seen, ViewEstimate, lacking, plan
+from pyvista_vdi.quality.plan import Made, Making, Plan, Seen, ViewEstimate, plan
 
 BOUNDS = (-1.0, 1.0) * 3
 HOME = View(Camera((0, 0, 9), (0, 0, 0), (0, 1, 0)), (320, 180))
@@ -96,20 +96,6 @@ def test_a_view_at_rest_is_estimated_and_gets_a_vdi_if_it_is_poor():
     assert of(good, view=turned(43)).estimate == "background", "it was of another view"
 
 
-def test_what_is_made_for_a_view_that_was_left_is_given_up_at_rest():
-    making = Making("a", turned(60), for_view=True)
-    on_the_way = replace(AWAY, making=making, draw="vdi")
-    assert not of(on_the_way, view=turned(55)).give_up
-    assert of(on_the_way, view=turned(5)).give_up
-    assert not of(on_the_way, view=turned(5), hand=True).give_up
-    assert not of(on_the_way, view=turned(5), making=replace(making, for_view=False)).give_up
-
-
-def test_somebody_who_sets_another_view_gets_its_vdi():
-    asked = of(screen=turned(90), chosen=True)
-    assert (asked.make, asked.show) == (turned(90), "vdi")
-
-
 def test_vdi_or_volume_whichever_is_better_in_time():
     assert of(costs=Costs(volume=1e-9)).show == "vdi", "until both have told"
     costs = Costs(volume=1e-7, vdi=1e-6)
@@ -134,14 +120,6 @@ def test_what_cannot_be_made_is_said_and_what_was_shown_stays():
     assert of(content=None, made=None).show == "trouble"
     assert of(content=None, watched=False).show == "trouble"
     assert of(content=None, draw="volume").show == "trouble"
-
-
-def test_draw_volume_makes_nothing():
-    found = of(draw="volume", late=True, making=Making("a", HOME, for_view=True))
-    assert (found.show, found.make, found.give_up) == ("volume", None, True)
-    assert of(draw="volume", joint=True, made=None).update
-    assert of(draw="volume", volume="bricks").show == "vdi"
-    assert of(draw="volume", volume="bricks", watched=False, content="b").in_bricks
 
 
 # Pictures that are kept
@@ -183,13 +161,6 @@ def test_pictures_in_which_volumes_overlap_are_drawn_by_vdis():
     assert (never.show, never.update) == ("vdi", True)
 
 
-def test_a_vdi_of_what_has_changed_takes_the_view_of_a_whole_picture():
-    changed = replace(KEPT, content="b", draw="vdi")
-    assert (plan(changed).view, plan(changed).update) == ("follow", True)
-    for stays in ({"regenerate": "never"}, {"one_view": False}, {"first_look": False}):
-        assert of(changed, **stays).view is None
-
-
 def test_whatever_is_seen_is_planned_without_fail():
     """All combinations; who is watched waits for nothing but a first VDI."""
     kinds = {
@@ -213,14 +184,3 @@ def test_whatever_is_seen_is_planned_without_fail():
         assert found.make is None or not (seen.failed or found.update)
         if seen.watched and seen.made is not None:
             assert not found.update
-
-
-def test_what_a_vdi_without_its_volume_lacks_is_said():
-    fine = Made(1, BOUNDS, angle=50.0, coverage=0.95, magnification=1.5)
-    assert lacking(fine, 60.0, "x") == []
-    poor = Made(1, BOUNDS, angle=70.0, coverage=0.5, magnification=2.5)
-    assert [cause for cause, _ in lacking(poor, 60.0, "x")] == [
-        "angle",
-        "coverage",
-        "magnification",
-    ]

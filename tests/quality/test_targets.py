@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import warnings
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from drawing import request
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import TransferFunction, Volume
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError, VDIWarning
+from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
 from pyvista_vdi.generation import generate
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -83,18 +82,6 @@ def test_the_cheapest_rung_that_reaches_the_goal(default_runtime, ladder, goal):
     assert all(ssim < goal + CLOSE for ssim, _ in ladder[below:rung])
 
 
-def test_asking_for_more_never_gives_less(default_runtime):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", VDIWarning)
-        for row in (
-            [{"target_ssim": goal} for goal in (0.5, 0.93, 0.97, 0.999)],
-            [{"target_ssim": 0.97, "max_bytes": limit} for limit in (1e3, 3e4, 1e5, 1e7)],
-        ):
-            rungs = [rung_of(generated(default_runtime, **asked)) for asked in row]
-            assert rungs == sorted(rungs)
-            assert rungs[0] < rungs[-1]
-
-
 def test_limits_are_kept_and_what_cannot_be_is_said(default_runtime, ladder):
     for rung in (0, 3, 8):
         limit = ladder[rung][1]
@@ -135,46 +122,12 @@ def test_what_contradicts_or_is_out_of_range_is_refused(default_runtime, asked, 
         generated(default_runtime, **asked)
 
 
-def test_reference_is_what_is_made_without_a_dial(default_runtime):
-    plain = generated(default_runtime)
-    reference = generated(default_runtime, quality="reference")
-    assert reference.equals(plain)
-    assert reference.metadata == plain.metadata
-    assert describe(plain.metadata) is None
-
-
-def test_the_target_view_turns_about_the_volume_wherever_the_camera_looks():
-    one, other = turned(VIEW, VOLUME.bounds, 30), VIEW.azimuth(30)  # at the centre: an azimuth
-    assert np.allclose(one.position, other.position)
-    assert np.allclose(one.axes, other.axes)
-    aside = VIEW.replace(focal_point=np.add(VIEW.focal_point, (3, 0, 0)))
-    moved = aside.replace(model_transform=[[2, 0, 0, 5], [0, 2, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1]])
-    centre = [*np.reshape(VOLUME.bounds, (3, 2)).mean(axis=1), 1]
-    for camera in (aside, moved):
-        before = camera.model_to_view @ centre
-        after = turned(camera, VOLUME.bounds, 40).model_to_view @ centre
-        assert np.linalg.norm(after[:3]) == pytest.approx(np.linalg.norm(before[:3]))
-
-
-def test_a_volume_out_of_view_is_made_as_cheaply_as_can_be(default_runtime):
-    aside = VIEW.replace(focal_point=np.add(VIEW.position, (0, -1, 0)))
-    with pytest.warns(pvdi.VDIWarning, match="the camera sees nothing"):
-        vdi = generated(default_runtime, camera=aside, target_ssim=0.98)
-    assert rung_of(vdi) == 2
-    assert vdi.metadata["dial"]["predicted"]["ssim"] == 1
-
-
 @pytest.mark.parametrize("name", PRESETS)
 def test_a_name_is_looked_up(default_runtime, name):
     vdi, (rung, ssim) = generated(default_runtime, quality=name), PRESETS[name]
     assert rung_of(vdi) == rung
     assert vdi.metadata["dial"]["predicted"] == {"ssim": ssim}
     assert f"predicted SSIM {ssim:.3f} at 30" in describe(vdi.metadata)
-
-
-def test_choosing_can_be_cancelled(default_runtime):
-    with pytest.raises(Cancelled):
-        generated(default_runtime, target_ssim=0.9, progress=lambda _: False)
 
 
 def test_metadata_say_what_was_asked_chosen_and_predicted(default_runtime, tmp_path):
@@ -192,11 +145,3 @@ def test_metadata_say_what_was_asked_chosen_and_predicted(default_runtime, tmp_p
     # It remembers the pictures that it is for, whatever its lists are
     assert again.picture_size == WINDOW != again.window_size
     assert pvdi.render(again, VIEW).shape == (WINDOW[1], WINDOW[0], 4)
-
-
-@pytest.mark.parametrize("foreign", [3, {}, {"chosen": {"window_size": [1]}}])
-def test_foreign_metadata_are_not_described(foreign):
-    assert describe({"dial": foreign}) is None
-    vdi = generated()
-    vdi.metadata["dial"] = foreign if foreign == 3 else {"window_size": foreign}
-    assert vdi.picture_size == vdi.window_size == WINDOW

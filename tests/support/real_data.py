@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import os
-
 import pytest
 
 from pyvista_vdi import examples
 from pyvista_vdi.errors import DataNotFoundError
-
-#: Whether an hour is taken for all cases of the standard table in place of a sample.
-TEST_WHOLE = os.environ.get("PYVISTA_VDI_TEST_WHOLE") == "1"
 
 
 def require_data(name, *, as_volume=True):
