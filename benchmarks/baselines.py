@@ -27,7 +27,7 @@ from reference.generate import vdi_of_lists
 from reference.raycast import Lists, near_limit
 from shared import Case, Latest, Results, benches, execute, milliseconds, parser_of, table
 
-from pyvista_vdi.device import DeviceBuffer, KernelDeclaration, Runtime
+from pyvista_vdi.device import DeviceBuffer, Runtime
 from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.measure.bench import accuracy, take_turns
 from pyvista_vdi.model import ray_forms as rays
@@ -37,7 +37,7 @@ from pyvista_vdi.model.vdi import VDI
 
 Runs = Sequence[Segment]
 
-KERNEL = KernelDeclaration(Path(__file__).with_name("world_rays.cl"), "world_rays")
+KERNEL = Path(__file__).with_name("world_rays.cl"), "world_rays"
 
 #: Supersegments of a list from which cuts are made: more than a ray through most data has.
 RECORDED = 512
@@ -137,7 +137,7 @@ class WorldRays:
         offsets = vdi.offsets.astype(np.int32)
         offsets, faces, media = map(self._upload, (offsets, faces, media))
         defines = {"BINARY_SEARCH": 1} if binary else {}
-        self._draw = runtime.bind(KERNEL, defines, offsets=offsets, faces=faces, media=media)
+        self._draw = runtime.bind(*KERNEL, defines, offsets=offsets, faces=faces, media=media)
         self._draw.set(lists_wide=self._wide, lists_high=self._high, cutoff=TRANSMITTANCE_CUTOFF)
 
     def image(self, camera: Camera, size: tuple[int, int]) -> NDArray[np.float32]:

@@ -20,7 +20,6 @@ _HOMES = {
     "Camera": "model.camera",
     "DeferredVDI": "model.deferred",
     "Cropping": "model.cropping",
-    "Estimate": "generation.slices",
     "Light": "model.lighting",
     "Lights": "model.lighting",
     "Pick": "raycasting.picking",
@@ -37,7 +36,7 @@ _HOMES = {
     "list_volumes": "io.volumes",
     "presets": "model.presets",
     "read_volume": "io.volumes",
-    **dict.fromkeys(("Settings", "estimate", "generate", "pick", "read"), "api"),
+    **dict.fromkeys(("Settings", "generate", "pick", "read"), "api"),
     **dict.fromkeys(("render", "render_depth", "render_volume"), "api"),
     **dict.fromkeys(errors.__all__, "errors"),
 }

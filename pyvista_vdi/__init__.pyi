@@ -4,7 +4,6 @@ from pyvista_vdi import errors as errors
 from pyvista_vdi import examples as examples
 from pyvista_vdi._version import __version__ as __version__
 from pyvista_vdi.api import Settings as Settings
-from pyvista_vdi.api import estimate as estimate
 from pyvista_vdi.api import generate as generate
 from pyvista_vdi.api import pick as pick
 from pyvista_vdi.api import read as read
@@ -19,7 +18,6 @@ from pyvista_vdi.extensions.series.series import VDISeries as VDISeries
 from pyvista_vdi.extensions.series.writer import SeriesWriter as SeriesWriter
 from pyvista_vdi.extensions.sets.generate import generate_set as generate_set
 from pyvista_vdi.extensions.sets.vdi_set import VDISet as VDISet
-from pyvista_vdi.generation.slices import Estimate as Estimate
 from pyvista_vdi.io.volumes import list_volumes as list_volumes
 from pyvista_vdi.io.volumes import read_volume as read_volume
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion as AmbientOcclusion

@@ -23,7 +23,6 @@ import os
 import re
 import signal
 import sysconfig
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -134,12 +133,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         needed = {name for mark in item.iter_markers("extension") for name in mark.args}
         if not needed <= {*registry.extensions()}:
             item.add_marker(pytest.mark.skip(f"needs the extension {', '.join(sorted(needed))}"))
-        some = item.get_closest_marker("every")
-        if some is not None:
-            # By the case's name: other cases on another device, the same in every process
-            chosen = zlib.crc32(item.name.encode()) % some.args[0] == 0
-            if not chosen and item.function in seen:
-                item.add_marker("slow")
         if any(map(item.get_closest_marker, ("slow", "paraview"))):
             continue
         if "runtime" in getattr(item, "fixturenames", ()):

@@ -7,15 +7,9 @@
 // node the mean opacity, over a step of the marches to come, of the box of one cell around it. All
 // nodes march in the same directions by the same steps, so ambient_transmittances reads the
 // opacities at offsets that are the same for every node: places and weights come in a table. Around
-// the nodes lies a margin of zeros, as wide as the marches reach. With GRID_PART a node gets what
-// its box has in the part's own cells; the sums over all parts are the opacities.
+// the nodes lies a margin of zeros, as wide as the marches reach.
 #include "volume/medium.cl"
 #pragma OPENCL FP_CONTRACT OFF
-
-// Whether a position lies in the part's own cells.
-#define OWN_CELL(position, axis)                                                                   \
-    (!GRID_PART ||                                                                                 \
-     ((position) >= classified.part_lower.axis && (position) < classified.part_upper.axis))
 
 // Whether any macrocell between two index positions may hold something visible.
 inline bool any_visible(__global const uchar *visible, int4 macrocells, float3 low, float3 high)
@@ -35,8 +29,6 @@ __kernel void
 step_opacities(const Classified classified, __global const VOXEL_T *voxels,
                __global const float4 *table, __global const uchar *blanked,
                __global const float *gradient, __global const uchar *visible,
-               int4 points, // of the whole grid along x, y, z
-               int4 first_node,
                int4 nodes,               // along x, y, z
                int4 cell,                // voxels from node to node
                int4 samples,             // along each edge of a cell
@@ -50,12 +42,11 @@ step_opacities(const Classified classified, __global const VOXEL_T *voxels,
         return;
     const Medium medium = {classified, voxels, table, 0, blanked, gradient, 0, 0};
     const float3 edge = convert_float3(cell.xyz);
-    const float3 centre = convert_float3((node + first_node.xyz) * cell.xyz);
+    const float3 centre = convert_float3(node * cell.xyz);
     const float3 apart = edge / convert_float3(samples.xyz);
     float sum = 0.0f;
-    const float3 here = (float3)(IN_PART(classified, centre.x, x), IN_PART(classified, centre.y, y),
-                                 IN_PART(classified, centre.z, z));
-    if (any_visible(visible, classified.macrocells, here - 0.5f * edge, here + 0.5f * edge))
+    const int4 points = classified.points.size;
+    if (any_visible(visible, classified.macrocells, centre - 0.5f * edge, centre + 0.5f * edge))
         for (int k = 0; k < samples.z; ++k)
             for (int j = 0; j < samples.y; ++j)
                 for (int i = 0; i < samples.x; ++i) {
@@ -64,8 +55,7 @@ step_opacities(const Classified classified, __global const VOXEL_T *voxels,
                     const float z = centre.z + (((float)k + 0.5f) * apart.z - 0.5f * edge.z);
                     // Beyond the volume there is nothing
                     if (x >= 0.0f && y >= 0.0f && z >= 0.0f && x <= (float)(points.x - 1) &&
-                        y <= (float)(points.y - 1) && z <= (float)(points.z - 1) &&
-                        OWN_CELL(x, x) && OWN_CELL(y, y) && OWN_CELL(z, z))
+                        y <= (float)(points.y - 1) && z <= (float)(points.z - 1))
                         sum += opacity_of(medium_at(&medium, x, y, z, units).w * steps);
                 }
     const int3 place = node + margin.xyz;

@@ -5,12 +5,11 @@ What converts an object is imported only where one needs it: for a :class:`Volum
 """
 
 from pyvista_vdi.api.pictures import pick, render, render_depth, render_volume
-from pyvista_vdi.api.vdis import estimate, generate, read
+from pyvista_vdi.api.vdis import generate, read
 from pyvista_vdi.model.arguments import Settings
 
 __all__ = [
     "Settings",
-    "estimate",
     "generate",
     "pick",
     "read",

@@ -6,7 +6,6 @@ import numpy as np
 import os
 from collections.abc import (Sequence)
 from numpy.typing import (ArrayLike, NDArray)
-from pyvista_vdi.generation.slices import (Estimate)
 from pyvista_vdi.model.collection import (VDICollection)
 from pyvista_vdi.model.deferred import (DeferredVDI)
 from pyvista_vdi.model.transfer_function import (TransferFunction)
@@ -19,18 +18,6 @@ from pyvista_vdi.model.vdi import (VDI)
 from pyvista_vdi.raycasting.picking import (Pick)
 from typing import (Any, Literal, overload)
 
-def estimate(
-    volume: VolumeLike, window_size: WindowSize, *, scalars: ScalarsLike | None = None, preference:
-    Preference = 'point', blending: Blending | str | int = 'composite', clim: RangeLike | None =
-    None, n_colors: int = 256, opacity: OpacityLike = 'linear', cmap: ColorMapLike | None = None,
-    flip_scalars: bool = False, opacity_unit_distance: float | None = None, log_scale: bool = False,
-    shade: bool = False, ambient: float | None = None, diffuse: float | None = 0.7, specular: float
-    | None = 0.2, specular_power: float | None = 10.0, interpolation: Interpolation = 'nearest',
-    volume_property: VTKObject | None = None, transfer_function: TransferFunction | None = None,
-    lights: LightsLike | None = None, ambient_occlusion: OcclusionLike | None = None,
-    max_supersegments: int = 20, precision: Precision = 'exact', settings: Settings | None = None,
-    device: DeviceLike | None = None,
-) -> Estimate: ...
 @overload
 def generate(
     volume: VolumeLike, camera: CameraLike, window_size: WindowSize, *, scalars: ScalarsLike | None

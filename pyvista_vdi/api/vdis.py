@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from functools import partial
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -35,9 +35,6 @@ from pyvista_vdi.model.types import (
 )
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.classified_values import classify_on_device
-
-if TYPE_CHECKING:
-    from pyvista_vdi.generation.slices import Estimate
 
 
 @takes(
@@ -147,52 +144,6 @@ def generate(
     if not vdi.n_supersegments and nearest_depth(read, request.camera, request.window_size) is None:
         warn_external(f"the VDI is empty: the camera sees nothing of the bounds {read.bounds}")
     return vdi
-
-
-@takes(look=Classification, options=GenerationOptions)
-def estimate(
-    volume: VolumeLike,
-    window_size: WindowSize,
-    look: Classification,
-    options: GenerationOptions,
-    *,
-    device: DeviceLike | None = None,
-) -> Estimate:
-    """Return how much memory generating a VDI takes, before it is taken.
-
-    Parameters
-    ----------
-    volume : pyvista.ImageData or vtkImageData or Volume
-        What the VDI would be made of. Scalars whose range is narrow for how far it is from 0 take
-        four bytes each.
-    window_size : (int, int)
-        Width and height in pixels.
-    device : str, optional
-        As for :func:`generate`: a GPU makes more of a VDI at a time.
-
-    Returns
-    -------
-    Estimate
-        Bytes of the volume, of the VDI at worst, of the working buffers, and their sum.
-
-    Raises
-    ------
-    InvalidVolumeError, InvalidArgumentError
-        If an argument cannot be used.
-    NoDeviceError
-        If there is no usable device, or not the one that was asked for.
-    """
-    look.require_composite()
-    read = as_volume(volume, look.scalars, look.preference)
-    from pyvista_vdi.generation.slices import estimate as estimate_bytes
-
-    return estimate_bytes(
-        read,
-        window_size,
-        options,
-        transfer_function=look.transfer_function_of(read),
-        device=device,
-    )
 
 
 def read(path: str | os.PathLike[str], **options: Any) -> VDI | DeferredVDI | VDICollection:

@@ -10,7 +10,7 @@ from pyvista_vdi.device.choice import describe_devices, get_runtime, list_device
 from pyvista_vdi.device.devices import DeviceInfo, bytes_text
 from pyvista_vdi.device.launches import Launch, Runtime, padded
 from pyvista_vdi.device.memory import DeviceBuffer, kept_together
-from pyvista_vdi.device.programs import Kernel, KernelDeclaration
+from pyvista_vdi.device.programs import Kernel
 from pyvista_vdi.model.host_memory import GrowingArray, aligned_empty
 
 __all__ = [
@@ -18,7 +18,6 @@ __all__ = [
     "DeviceInfo",
     "GrowingArray",
     "Kernel",
-    "KernelDeclaration",
     "Launch",
     "Runtime",
     "aligned_empty",

@@ -12,10 +12,8 @@ import numpy as np
 from pyvista_vdi.device import devices
 from pyvista_vdi.device.devices import DeviceInfo, bytes_text
 from pyvista_vdi.device.launches import Runtime
-from pyvista_vdi.device.programs import KernelDeclaration
 from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError
 
-PROBE = KernelDeclaration("lib/probe.cl", "probe")
 PROBE_COUNT, PROBE_GROUP = 256, 32
 # OpenCL 1.2 allows expm1 and exp 3 ulp, log1p 2 ulp (section 7.4); one ulp is at most 2^-23 of the
 # value; the fourth is for the reference, which is rounded to single precision nowhere.
@@ -165,7 +163,9 @@ def run_probe(runtime: Runtime) -> str:
         runtime.buffer((1,), np.uint32, name="probe total") as total,
     ):
         runtime.fill(total, 0)
-        launch = runtime.bind(PROBE, x=inputs, values=values, group_sum=sums, total=total)
+        launch = runtime.bind(
+            "lib/probe.cl", "probe", x=inputs, values=values, group_sum=sums, total=total
+        )
         launch(PROBE_COUNT, PROBE_GROUP, shared=PROBE_GROUP)
         computed, group_sums, whole = (runtime.download(b) for b in (values, sums, total))
     exact = x.astype(np.float64)

@@ -6,12 +6,13 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import nullcontext
+from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.device import programs
 from pyvista_vdi.device.devices import DeviceInfo
 from pyvista_vdi.device.memory import DeviceBuffer, Memory
-from pyvista_vdi.device.programs import Define, Kernel, KernelDeclaration
+from pyvista_vdi.device.programs import Define, Kernel
 from pyvista_vdi.device.scheduling import Worker
 from pyvista_vdi.errors import InvalidArgumentError, KernelBuildError
 
@@ -173,37 +174,37 @@ class Runtime(Memory):
 
     def bind(
         self,
-        declaration: KernelDeclaration,
+        path: str | Path,
+        name: str,
         defines: Mapping[str, Define] | None = None,
         /,
         **arguments: Any,
     ) -> Launch:
         """Return a launch of a kernel, which is compiled when first asked for.
 
-        ``defines`` are ``-D`` options: what changes the code's shape; floats become exact float32
-        literals. Arguments are those that are known already. Numbers are converted to the declared
-        type, which they must fit; vectors are given as arrays or sequences, structures as
-        dictionaries of their fields, local memory as elements for each work-group; None is a null
-        pointer.
+        ``path`` is a file of ``pyvista_vdi.opencl``, or any other one as a Path. ``defines`` are
+        ``-D`` options: what changes the code's shape; floats become exact float32 literals.
+        Arguments are those that are known already. Numbers are converted to the declared type,
+        which they must fit; vectors are given as arrays or sequences, structures as dictionaries of
+        their fields, local memory as elements for each work-group; None is a null pointer.
 
         Raises KernelBuildError if it cannot be assembled or compiled, InvalidArgumentError if a
         name is no argument's, TypeError if a value is not of its argument's type, and DeviceError
         if a buffer has been released.
         """
-        launch = Launch(self, self.kernel(declaration, defines or {}))
+        launch = Launch(self, self.kernel(path, name, defines or {}))
         launch.set(**arguments)
         return launch
 
-    def kernel(self, declaration: KernelDeclaration, defines: Mapping[str, Define]) -> Kernel:
+    def kernel(self, path: str | Path, name: str, defines: Mapping[str, Define]) -> Kernel:
         """Return a kernel, compiled when first asked for, and the same for the same source.
 
         Threads may share it. KernelBuildError if it cannot be assembled or compiled, or the file
         has no such function. Background work compiles beside frames: that takes seconds, and not
         the device.
         """
-        path, options = declaration.path, (*self._options, *programs.define_options(defines))
-        source = programs.expand(path)
-        program, key = (source, options), (source, declaration.name, options)
+        options, source = (*self._options, *programs.define_options(defines)), programs.expand(path)
+        program, key = (source, options), (source, name, options)
         if key in self._kernels:
             return self._kernels[key]
         aside = nullcontext() if self.thread.worker is None else self.aside()
@@ -215,12 +216,11 @@ class Runtime(Memory):
                 self._programs[program] = programs.build(*of, source, options)
             if key not in self._kernels:
                 try:
-                    made = Kernel(self._programs[program], declaration, defines)
+                    made = Kernel(self._programs[program], path, name, defines)
                 except self.cl.Error as exc:
                     names = self._programs[program].kernel_names.replace(";", ", ") or "none"
                     raise KernelBuildError(
-                        f"{path} has no kernel {declaration.name!r}; with these options it has: "
-                        f"{names}",
+                        f"{path} has no kernel {name!r}; with these options it has: {names}",
                         options=" ".join(options),
                     ) from exc
                 self._kernels[key] = made

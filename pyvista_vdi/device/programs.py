@@ -1,8 +1,7 @@
 """Kernels as Python knows them, their text with its includes, and programs compiled once.
 
-A declaration has a kernel's arguments by name and type. Files of the package are expanded once per
-program, with ``#line`` marks, and compiled once per device, source and options; threads may share
-kernels.
+A kernel's file says what its arguments are. Files of the package are expanded once per program,
+with ``#line`` marks, and compiled once per device, source and options; threads may share kernels.
 """
 
 import contextlib
@@ -93,36 +92,29 @@ class Parameter(NamedTuple):
         return converted
 
 
-class KernelDeclaration(NamedTuple):
-    """A kernel function of a file of ``pyvista_vdi.opencl``, or of any other one as a Path.
-
-    The file says what its arguments are.
-    """
-
-    path: str | Path
-    name: str
-
-    def parameters(self, defines: Mapping[str, Define]) -> dict[str, Parameter]:
-        """Return the arguments in a program with these ``-D`` options, by name and in order."""
-        source = _COMMENT.sub("", expand(self.path))
-        known: dict[str, np.dtype[Any]] = dict(SCALARS)
-        for body, name in _STRUCTURE.findall(source):
-            fields: dict[str, np.dtype[Any] | None] = {}
-            for each in body.split(";")[:-1]:
-                kind, *names = each.replace(",", " ").split()
-                inner = known.get(kind)
-                if inner is not None and inner.names:  # whose fields are the structure's own
-                    fields |= {name: inner[name] for name in inner.names}
-                else:
-                    fields |= {name: _dtype(kind, known) for name in names}
-            if not any(kind is None for kind in fields.values()):
-                known[name] = _laid_out(fields)
-        found: dict[str, Parameter] = {}
-        for name, declared in written_arguments(source, self.name).items():
-            element = declared.removeprefix("local ").removesuffix("*")
-            dtype = _dtype(str(defines.get(element, element)), known)
-            found[name] = Parameter(len(found), declared, dtype)
-        return found
+def parameters_of(
+    path: str | Path, name: str, defines: Mapping[str, Define]
+) -> dict[str, Parameter]:
+    """Return a kernel's arguments in a program with these ``-D`` options, by name, in order."""
+    source = _COMMENT.sub("", expand(path))
+    known: dict[str, np.dtype[Any]] = dict(SCALARS)
+    for body, structure in _STRUCTURE.findall(source):
+        fields: dict[str, np.dtype[Any] | None] = {}
+        for each in body.split(";")[:-1]:
+            kind, *names = each.replace(",", " ").split()
+            inner = known.get(kind)
+            if inner is not None and inner.names:  # whose fields are the structure's own
+                fields |= {each: inner[each] for each in inner.names}
+            else:
+                fields |= {each: _dtype(kind, known) for each in names}
+        if not any(kind is None for kind in fields.values()):
+            known[structure] = _laid_out(fields)
+    found: dict[str, Parameter] = {}
+    for argument, declared in written_arguments(source, name).items():
+        element = declared.removeprefix("local ").removesuffix("*")
+        dtype = _dtype(str(defines.get(element, element)), known)
+        found[argument] = Parameter(len(found), declared, dtype)
+    return found
 
 
 def _dtype(kind: str, known: Mapping[str, np.dtype[Any]]) -> np.dtype[Any] | None:
@@ -247,10 +239,10 @@ class Kernel:
     """
 
     def __init__(
-        self, program: Any, declaration: KernelDeclaration, defines: Mapping[str, Define]
+        self, program: Any, path: str | Path, name: str, defines: Mapping[str, Define]
     ) -> None:
-        self.path, self.name = str(declaration.path), declaration.name
-        self._program, self.parameters = program, declaration.parameters(defines)
+        self.path, self.name = str(path), name
+        self._program, self.parameters = program, parameters_of(path, name, defines)
         self.free = [self.new_object()]
 
     def new_object(self) -> Any:

@@ -17,7 +17,6 @@ from pyvista_vdi.device import (
     kept_together,
 )
 from pyvista_vdi.device.constants import GROUP, LISTS_PER_ITEM
-from pyvista_vdi.generation.kernels import LIST_OFFSETS, SUM_LENGTHS
 from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.packing import Arrays
 
@@ -133,8 +132,10 @@ class GrowingLists:
             offsets = keep(runtime.target(self._offsets, "list offsets"))
             runtime.write(offsets, np.zeros(1, np.uint64), first=0)
             shared = {"partial": GROUP, "sums": sums}
-            self._sum_lengths = runtime.bind(SUM_LENGTHS, **shared)
-            self._place_lists = runtime.bind(LIST_OFFSETS, **shared, all_offsets=offsets)
+            self._sum_lengths = runtime.bind("generation/offsets.cl", "sum_lengths", **shared)
+            self._place_lists = runtime.bind(
+                "generation/offsets.cl", "list_offsets", **shared, all_offsets=offsets
+            )
             self._sums, self._starts = sums, offsets
             try:
                 self._make_room(0, 1)

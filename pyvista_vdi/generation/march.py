@@ -10,13 +10,6 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime
 from pyvista_vdi.device.constants import GROUP, RUN_WORDS, block_items
-from pyvista_vdi.generation.kernels import (
-    CUT_LISTS,
-    LONGEST_MARCHES,
-    MARCH_LISTS,
-    PACK_LISTS,
-    SHORTEN_LISTS,
-)
 from pyvista_vdi.generation.list_arrays import GrowingLists
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
 from pyvista_vdi.model.camera import Camera
@@ -84,7 +77,8 @@ class Records:
         records: dict[str, Any] = {"forms": self.forms, "records": self.runs}
         self._shorten = RayLaunch(
             runtime,
-            SHORTEN_LISTS,
+            "generation/shorten_lists.cl",
+            "shorten_lists",
             self.defines,
             **records,
             thresholds=self.thresholds,
@@ -94,9 +88,17 @@ class Records:
         self._cut = None
         if options.criterion == "homogeneity":
             records["counts"] = self.counts
-            self._cut = runtime.bind(CUT_LISTS, self.defines, **records, recording=self._budget)
+            self._cut = runtime.bind(
+                "generation/homogeneity.cl",
+                "cut_lists",
+                self.defines,
+                **records,
+                recording=self._budget,
+            )
             del records["counts"]
-        self._pack = runtime.bind(PACK_LISTS, self.defines, **records, capacity=capacity)
+        self._pack = runtime.bind(
+            "generation/pack_lists.cl", "pack_lists", self.defines, **records, capacity=capacity
+        )
 
     def __enter__(self) -> "Records":
         return self
@@ -182,7 +184,8 @@ class March:
                 self._sampler = stack.enter_context(sampler)
             self._launch = RayLaunch(
                 runtime,
-                MARCH_LISTS,
+                "generation/march_lists.cl",
+                "march_lists",
                 variant.defines,
                 one_by_one=variant.one_by_one or bricks,
                 **arguments,
@@ -229,7 +232,8 @@ class March:
             runtime.fill(longest, np.int32(0))
             launch = RayLaunch(
                 runtime,
-                LONGEST_MARCHES,
+                "generation/march_lists.cl",
+                "longest_marches",
                 variant.defines,
                 one_by_one=one_by_one,
                 classified=medium["classified"],

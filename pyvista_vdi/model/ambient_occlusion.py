@@ -7,7 +7,6 @@ such as ambient occlusion" (section 2). Computed is docs/dev/conventions.md, "Am
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -150,18 +149,6 @@ class OcclusionGrid:
             radius / steps,
             directions[:, None, :] * along[None, :, None],
         )
-
-    def nodes_around(
-        self, lower: Sequence[float], upper: Sequence[float]
-    ) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
-        """Return the first node, and nodes, along x, y and z, whose boxes meet part of the volume.
-
-        ``lower``, ``upper``: index positions between which it lies.
-        """
-        cell = np.array(self.cell)
-        first = np.clip(np.ceil(np.array(lower) / cell - 0.5), 0, None)
-        last = np.clip(np.floor(np.array(upper) / cell + 0.5), None, np.array(self.nodes) - 1)
-        return _triple(first.astype(int)), _triple((last - first).astype(int) + 1)
 
     @property
     def margin(self) -> tuple[int, int, int]:

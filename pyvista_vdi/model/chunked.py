@@ -54,14 +54,10 @@ class ChunkedArray:
             self._index = (slice(None),) * 3
         kept = [k for k, at in enumerate(self._index) if isinstance(at, slice)]
         if len(kept) != 3 or len(self._index) != len(self._array.shape):
-            if source.shape[-1:] == (4,) and len(source.shape) == 4 and source.dtype == np.uint8:
-                raise InvalidVolumeError(
-                    f"{_described(source)} has four numbers of type uint8 a voxel, RGBA: colours "
-                    "are not read chunk by chunk: load them, Volume(numpy.asarray(array))"
-                )
             raise InvalidVolumeError(
                 f"a volume is a three-dimensional array; got shape {tuple(source.shape)}: choose "
-                "time and channel (pyvista_vdi.read_volume does), or index the array"
+                "time and channel (pyvista_vdi.read_volume does), index the array, or load "
+                "colours, Volume(numpy.asarray(array))"
             )
         if any(math.isnan(n) for n in self._array.shape):
             raise InvalidVolumeError(

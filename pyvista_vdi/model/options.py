@@ -223,6 +223,7 @@ class MediumOptions(Options):
     sample_distance: float | None = option(
         None,
         "length of a step along a ray, model units; half the smallest spacing by default",
+        check=Number("a positive length in model units", open_ended=True),
         setting=True,
     )
     lights: Lights = option(

@@ -50,23 +50,15 @@ def filling_camera(
 
     The eye looks at the centre of ``bounds`` (x0, x1, y0, y1, z0, z1), and is on the -y side at
     ``azimuth`` 0, which is counter-clockwise seen from above (VTK's ``Azimuth``); ``elevation`` is
-    above the horizontal plane, between -90 and 90, both excluded. The distance is the smallest at
+    above the horizontal plane, less than 90 degrees either way. The distance is the smallest at
     which all eight corners lie inside the viewport. ``camera.azimuth(5)`` is the view "5 degrees
-    from V_O". InvalidArgumentError if the bounds are not finite, enclose nothing, or the elevation
-    looks along the z axis.
+    from V_O". InvalidArgumentError if the bounds are not finite or enclose nothing, and
+    InvalidCameraError for angles that make no view.
     """
     width, height = check_window_size(window_size)
     box = np.array(as_bounds(bounds))
     if not np.any(box[1::2] > box[::2]):
         raise InvalidArgumentError(f"the bounds {box.tolist()} are a point: nothing fills a view")
-    if not abs(elevation) < 90:
-        raise InvalidArgumentError(
-            f"elevation must lie between -90 and 90 degrees, both excluded; got {elevation!r}"
-        )
-    if not 0 < view_angle < 180:
-        raise InvalidArgumentError(
-            f"view_angle must lie between 0 and 180 degrees, both excluded; got {view_angle!r}"
-        )
     centre = (box[::2] + box[1::2]) / 2
     turn, lift = math.radians(azimuth), math.radians(elevation)
     to_eye = np.array(
@@ -82,9 +74,4 @@ def filling_camera(
     t_x, t_y = (t * (1 - _MARGIN) for t in towards.half_extent((width, height)))
     with np.errstate(all="ignore"):
         distance = float(np.max(np.maximum(np.abs(x) / t_x, np.abs(y) / t_y) - z))
-    if not math.isfinite(distance):
-        raise InvalidArgumentError(
-            f"view_angle {view_angle!r} is too narrow: no eye is far enough away to see the bounds "
-            "whole; choose a wider one"
-        )
     return towards.replace(position=centre + to_eye * distance)

@@ -4,17 +4,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pyvista_vdi.device import KernelDeclaration, Runtime
+from pyvista_vdi.device import Runtime
 from pyvista_vdi.device.constants import COLUMN_ITEMS, GROUP, block_items, part_columns
 from pyvista_vdi.model.float32_limits import summation
-from pyvista_vdi.raycasting import kernels
 from pyvista_vdi.raycasting.packets import LANES
 from pyvista_vdi.raycasting.scene import Scene
+
+_RAYCAST = "raycasting/raycast.cl", "raycast"
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A kernel that draws a scene, and how it is launched.
+    """A kernel that draws a scene, by its file and name, and how it is launched.
 
     ``switches`` are its ``-D`` options, eight at most. ``items`` are its work-items, each of which
     follows ``rays`` rays, and ``group`` those of a group; of segments, 0 and those of a group.
@@ -22,7 +23,7 @@ class Variant:
     it writes every pixel of the window, those beside :attr:`Scene.part`, too.
     """
 
-    kernel: KernelDeclaration
+    kernel: tuple[str, str]
     switches: Mapping[str, int | str]
     items: int
     group: int
@@ -67,16 +68,20 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         switches = {**lists, **sums, "CROPPED": cropped}
         counts = {"counts": prepared.occupancy.counts, "samples": options.preview_samples}
         items = block_items(*scene.size)
-        return Variant(kernels.PREVIEW, switches, items, GROUP, counts, whole=True)
+        return Variant(
+            ("raycasting/preview.cl", "preview"), switches, items, GROUP, counts, whole=True
+        )
 
     # What rays cross of one of several VDIs
     if scene.segments:
         lanes = LANES if device.is_cpu and suit_blocks else 1
         switches = {**lists, **walk, "SEGMENT_ROWS": int(device.is_cpu), "LANES": lanes}
-        return Variant(kernels.SEGMENTS, switches, 0, GROUP // lanes, {}, lanes)
+        return Variant(
+            ("multi_vdi/segments.cl", "segments"), switches, 0, GROUP // lanes, {}, lanes
+        )
 
     def by_columns(
-        kernel: KernelDeclaration, switches: Mapping[str, int | str], rays: int = 1, **own: Any
+        kernel: tuple[str, str], switches: Mapping[str, int | str], rays: int = 1, **own: Any
     ) -> Variant:
         """Return the variant that draws the scene's part in strips, column by column."""
         columns = part_columns(scene.part)
@@ -86,7 +91,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
 
     if scene.hit is not None:
         return by_columns(
-            kernels.FIRST_HITS,
+            ("raycasting/first_hits.cl", "first_hits"),
             {**lists, **walk, "ONE_LIST": int(scene.one_list)},
             least_optical_depth=scene.hit.optical_depth,
             accumulated=int(scene.hit.accumulated),
@@ -97,13 +102,14 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     in_blocks = in_vectors and suit_blocks
     uncropped = in_vectors and not cropped
     if uncropped and scene.aligned is not None:
-        kernel, own = kernels.RAYCAST_ALIGNED_VIEW, {"origin": scene.aligned.origin}
+        kernel = "raycasting/aligned_view.cl", "raycast_aligned_view"
+        own = {"origin": scene.aligned.origin}
         items = scene.aligned.items
         return Variant(kernel, {**lists, **sums}, items, LANES, own, LANES, whole=True)
     # Each ray is still in one list: the kernel for single rays has a loop along it. Cropped rays
     # are followed in blocks where they can be
     if scene.one_list and not (cropped and in_blocks):
-        return by_columns(kernels.RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 1})
+        return by_columns(_RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 1})
 
     # Rays that have many lists in common
     packets = scene.packets if uncropped else None
@@ -111,10 +117,17 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         ways = {"UPRIGHT": int(packets.upright), "SWEEP_V": int(packets.sweep_v)}
         switches = {**lists, **sums, **ways, "SKIP_EMPTY": walk["SKIP_EMPTY"]}
         across: dict[str, Any] = {"epipole": packets.epipole, "part": packets.part}
-        return Variant(kernels.RAYCAST_PACKETS, switches, packets.items, LANES, across, LANES)
+        return Variant(
+            ("raycasting/packets.cl", "raycast_packets"),
+            switches,
+            packets.items,
+            LANES,
+            across,
+            LANES,
+        )
     lanes = LANES if in_blocks else 1
     switches = {**lists, **walk, **sums, "ONE_LIST": 0, "LANES": lanes}
-    return by_columns(kernels.RAYCAST, switches, lanes)
+    return by_columns(_RAYCAST, switches, lanes)
 
 
 def choose_merge(device: Runtime, scenes: Sequence[Scene]) -> Variant:
@@ -123,4 +136,4 @@ def choose_merge(device: Runtime, scenes: Sequence[Scene]) -> Variant:
     lanes = LANES if device.is_cpu and compensated < 2 else 1
     switches = {"STREAMS": len(scenes), "COMPENSATED": compensated}
     switches |= {"SEGMENT_ROWS": int(device.is_cpu), "LANES": lanes}
-    return Variant(kernels.MERGE, switches, 0, GROUP // lanes, {}, lanes)
+    return Variant(("multi_vdi/merge.cl", "merge"), switches, 0, GROUP // lanes, {}, lanes)

@@ -8,7 +8,6 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import DeviceLike
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.kernels import CLASSIFY_VALUES
 from pyvista_vdi.raycasting.prepared import kept_values
 
 
@@ -36,7 +35,8 @@ def classify_on_device(
             runtime.result((n,), name="optical depths") as optical_depths,
         ):
             launch = runtime.bind(
-                CLASSIFY_VALUES,
+                "raycasting/classify_values.cl",
+                "classify_values",
                 **kept_values(runtime, deferred).values,
                 integrals=table,
                 colors=colors,

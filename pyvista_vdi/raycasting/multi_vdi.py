@@ -25,7 +25,6 @@ from pyvista_vdi.model.ray_forms import Rectangle, cells_of_points
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose, choose_merge
-from pyvista_vdi.raycasting.kernels import ALONE_ENDS, TAKE_CELLS
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.raycasting.raycast import enqueue, render_vdi
 from pyvista_vdi.raycasting.scene import OnDevice, Scene
@@ -290,8 +289,8 @@ def _draw_alone(
     with contextlib.ExitStack() as stack:
         alone = stack.enter_context(runtime.upload(cells.alone, "cells"))
         window = {"alone": alone, "cells_wide": wide, "width": size[0], "height": size[1]}
-        end_rays = runtime.bind(ALONE_ENDS, **window)
-        take = runtime.bind(TAKE_CELLS, **window, image=image, owner=owner)
+        end_rays = runtime.bind("multi_vdi/cells.cl", "alone_ends", **window)
+        take = runtime.bind("multi_vdi/cells.cl", "take_cells", **window, image=image, owner=owner)
         picture, ends = image, None  # others are drawn over the first one's picture
         for number, (scene, (forms, opaque)) in enumerate(zip(scenes, on_device, strict=True)):
             part = cells.part(number, size)
@@ -332,7 +331,7 @@ class _MergedCells:
         for number, i in enumerate(order):
             scene, variant = scenes[i], choose(runtime, scenes[i])
             launch = runtime.bind(
-                variant.kernel,
+                *variant.kernel,
                 variant.switches,
                 **scene.arguments(*on_device[i]),
                 number=number,
@@ -343,7 +342,7 @@ class _MergedCells:
         merge = choose_merge(runtime, scenes)
         self._merged_rays = merge.rays
         self._merge = runtime.bind(
-            merge.kernel,
+            *merge.kernel,
             merge.switches,
             width=scenes[0].size[0],
             height=scenes[0].size[1],

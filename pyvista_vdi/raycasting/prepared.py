@@ -20,15 +20,6 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.float32_limits import lists_are_far
 from pyvista_vdi.model.vdi import VDI, with_arrays
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.kernels import (
-    COUNT_PACKED,
-    COUNT_SUPERSEGMENTS,
-    ENDS_OF_LISTS,
-    OCCUPIED_SLABS,
-    PREPARE_LISTS,
-    PREPARE_PACKED,
-    PREPARE_VALUES,
-)
 from pyvista_vdi.raycasting.packets import share_lit
 from pyvista_vdi.volume.upload import release_voxels
 
@@ -112,7 +103,11 @@ class OccupancyGrid:
             runtime.fill(self.counts, np.uint32(0))
             count(grid=grid, changes=self.counts)
             occupied = runtime.bind(
-                OCCUPIED_SLABS, counts=self.counts, stacks=wide * high, masks=self.masks
+                "raycasting/occupancy.cl",
+                "occupied_slabs",
+                counts=self.counts,
+                stacks=wide * high,
+                masks=self.masks,
             )
             occupied(padded(wide * high, GROUP), GROUP)
             masks = runtime.download(self.masks)
@@ -301,7 +296,8 @@ class PreparedVDI:
 
             def count(**grid: Any) -> None:
                 lists = held if packing else {name: held[name] for name in _COUNTED}
-                counting = runtime.bind(COUNT_PACKED if packing else COUNT_SUPERSEGMENTS, **lists)
+                kernel = "count_packed" if packing else "count_supersegments"
+                counting = runtime.bind("raycasting/occupancy.cl", kernel, **lists)
                 counting(per_list, GROUP, **grid)
 
             self.occupancy = OccupancyGrid(self, count)
@@ -319,8 +315,8 @@ class PreparedVDI:
                 self.media = keep(self._made((self._entries, 4), "supersegment media"))
                 arguments |= {"depth_origin": self.depth_origin, "nearest": self.nearest}
                 arguments |= {"faces": self.faces, "media": self.media}
-            kernel = PREPARE_PACKED if packing is not None else PREPARE_LISTS
-            prepare = runtime.bind(kernel, self.switches, **arguments)
+            kernel = "prepare_packed" if packing is not None else "prepare_lists"
+            prepare = runtime.bind("raycasting/prepare.cl", kernel, self.switches, **arguments)
             prepare(per_list, GROUP)
             runtime.finish()  # the buffers above may be host memory in use
         if runtime.is_cpu:
@@ -339,7 +335,9 @@ class PreparedVDI:
         lists = self.window[0] * self.window[1]
         with self.runtime.result((lists, 2), name="ends of lists") as ends:
             counted = {name: held[name] for name in _COUNTED}
-            gather = self.runtime.bind(ENDS_OF_LISTS, **counted, lists=lists, ends=ends)
+            gather = self.runtime.bind(
+                "raycasting/occupancy.cl", "ends_of_lists", **counted, lists=lists, ends=ends
+            )
             gather(padded(lists, GROUP), GROUP)
             return self.runtime.download(ends)[vdi.counts.ravel() > 0]
 
@@ -403,7 +401,8 @@ class KeptValues(PreparedVDI):
             shown.faces = keep(self._made((self._entries, 2), "supersegment faces"))
             shown.media = keep(self._made((self._entries, 4), "supersegment media"))
             prepare = runtime.bind(
-                PREPARE_VALUES,
+                "raycasting/prepare_values.cl",
+                "prepare_values",
                 self.switches,
                 **self._faces,
                 **self.values,

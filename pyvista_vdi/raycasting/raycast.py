@@ -11,7 +11,6 @@ from pyvista_vdi.model.ray_forms import reference_depth
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose
-from pyvista_vdi.raycasting.kernels import CLEAR_HITS, CLEAR_IMAGE
 from pyvista_vdi.raycasting.picking import FirstHit
 from pyvista_vdi.raycasting.prepared import PreparedVDI, prepared_vdi
 from pyvista_vdi.raycasting.scene import Scene
@@ -78,10 +77,10 @@ def enqueue(scene: Scene, arguments: dict[str, Any], image: DeviceBuffer) -> Non
     variant = choose(runtime, scene)
     pixels = scene.size[0] * scene.size[1]
     if not variant.whole and scene.only is None and scene.part.pixels < pixels:
-        clear = CLEAR_IMAGE if scene.hit is None else CLEAR_HITS
-        cleared = runtime.bind(clear, pixels=pixels, image=image)
+        clear = "clear_image" if scene.hit is None else "clear_hits"
+        cleared = runtime.bind("raycasting/clear.cl", clear, pixels=pixels, image=image)
         cleared(padded(pixels, _CLEARING_GROUP), _CLEARING_GROUP)
     launch = runtime.bind(
-        variant.kernel, variant.switches, **arguments, **variant.arguments, image=image
+        *variant.kernel, variant.switches, **arguments, **variant.arguments, image=image
     )
     launch(variant.items, variant.group)

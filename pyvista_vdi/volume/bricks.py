@@ -18,7 +18,6 @@ from numpy.typing import DTypeLike, NDArray
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, kept_together
 from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.errors import DeviceMemoryError
-from pyvista_vdi.volume.kernels import SAMPLE_STEPS, WANT_BRICKS
 from pyvista_vdi.volume.rays import Variant
 
 #: Logarithms to base 2 of the cells along a brick's edge: large ones copy fewer points twice.
@@ -258,8 +257,12 @@ class StepSampler:
         rays: dict[str, Any] = {"forms": forms, "opaque_depth": ends, "visible": bricks.visible}
         rays |= {"bricks": bricks.layout.numbers, "samples": self.samples}
         defines = replace(variant, index="uint").defines  # of a brick's points
-        self._want = runtime.bind(WANT_BRICKS, defines, classified=medium["classified"], **rays)
-        self._take = runtime.bind(SAMPLE_STEPS, defines, **medium, slots=bricks.slots, **rays)
+        self._want = runtime.bind(
+            "volume/bricks.cl", "want_bricks", defines, classified=medium["classified"], **rays
+        )
+        self._take = runtime.bind(
+            "volume/bricks.cl", "sample_steps", defines, **medium, slots=bricks.slots, **rays
+        )
 
     def __enter__(self) -> "StepSampler":
         return self

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, padded
 from pyvista_vdi.device.constants import GROUP
@@ -24,12 +23,7 @@ from pyvista_vdi.volume.bricks import (
     least_brick_bytes,
     too_small,
 )
-from pyvista_vdi.volume.kernels import (
-    MACROCELL_DISTANCES,
-    MACROCELL_VISIBILITY,
-    SCALAR_MEDIA,
-)
-from pyvista_vdi.volume.occlusion_grid import ambient_transmittances, opacities_of_part
+from pyvista_vdi.volume.occlusion_grid import ambient_transmittances
 from pyvista_vdi.volume.rays import GridPart, GridRays, Variant, checked_sample_distance
 from pyvista_vdi.volume.upload import (
     ENTRY_BYTES,
@@ -65,9 +59,8 @@ class DeviceVolume:
     classification. ``options``, and ``changes`` of them, say how it is sampled; ``skip_empty``
     passes by macrocells that the transfer function makes transparent, with the same samples. With
     ``part``, the volume's points lie in a grid of which they are a part: marches go along the whole
-    grid's rays, and take the steps that belong to the part; ``ambient``, float32 (nz, ny, nx), is
-    then the mean transmittance around the nodes of the whole grid's occlusion. A volume for which
-    ``room`` is too little is held brick by brick; without it in one piece or refused.
+    grid's rays, and take the steps that belong to the part. A volume for which ``room`` is too
+    little is held brick by brick; without it in one piece or refused.
 
     Rays are marched through ``grid``, the volume or what it is a part of. ``bricks`` are on the
     device where the whole volume is not: steps must be sampled by a
@@ -86,7 +79,6 @@ class DeviceVolume:
         *,
         skip_empty: bool = True,
         part: GridPart | None = None,
-        ambient: NDArray[np.float32] | None = None,
         room: Room | None = None,
         **changes: Any,
     ) -> None:
@@ -159,11 +151,7 @@ class DeviceVolume:
                     f"{bytes_text(device_bytes(volume, scale))}: raise memory_limit, leave "
                     "ambient_occlusion out, or use another device"
                 )
-            self._arguments["ambient"] = (
-                self._occluded(asked, occlusion)
-                if ambient is None
-                else runtime.upload(ambient, "ambient occlusion")
-            )
+            self._arguments["ambient"] = self._occluded(asked, occlusion)
         # Last: nothing that fails then keeps them for as long as somebody looks at the error
         self.bricks: DeviceBricks | None = None
         if voxels.buffer is None:
@@ -206,36 +194,15 @@ class DeviceVolume:
         opacity = looks.replace(colors=np.zeros_like(looks.colors), shading=None)
         radius, directions = occlusion.radius_in(self.volume), occlusion.directions
         key = (opacity, radius, directions, self.sample_distance)
-        return uploads_of(self.volume).kept(
-            self.runtime,
-            "occlusion",
-            key,
-            lambda: ambient_transmittances(self.runtime, grid, **self._opacity_arguments()),
-        )
-
-    def part_opacities(
-        self,
-        grid: OcclusionGrid,
-        first: tuple[int, int, int],
-        nodes: tuple[int, int, int],
-    ) -> NDArray[np.float32]:
-        """Return what this part of a volume has of the opacities of its occlusion's nodes.
-
-        ``first``: the first of ``nodes``, both along x, y and z; float32 (nz, ny, nx).
-        """
-        points = self.grid.dimensions
-        return opacities_of_part(
-            self.runtime, grid, points, first, nodes, **self._opacity_arguments()
-        )
-
-    def _opacity_arguments(self) -> dict[str, Any]:
-        """Return what the opacities of an occlusion's nodes are made of: lights have no part."""
         names = ("classified", "voxels", "table", "blanked", "gradient")
-        return {
-            "medium": {**{k: self._arguments[k] for k in names}, "visible": self._visible},
-            "variant": replace(self.variant, shaded=0, compensated=0, sharp=False),
-            "lengths": (self.sample_distance, self.unit_distance),
-        }
+        medium = {**{name: self._arguments[name] for name in names}, "visible": self._visible}
+        variant = replace(self.variant, shaded=0, compensated=0, sharp=False)
+        lengths = self.sample_distance, self.unit_distance
+
+        def make() -> DeviceBuffer:
+            return ambient_transmittances(self.runtime, grid, medium, variant, lengths)
+
+        return uploads_of(self.volume).kept(self.runtime, "occlusion", key, make)
 
 
 @dataclass(frozen=True)
@@ -305,7 +272,9 @@ def _media_of_scalars(runtime: Runtime, table: _Table, first: int, last: int) ->
     n = last - first + 1
     media = runtime.buffer((n, 4), name="media of scalars")
     with table.buffer as classified:
-        launch = runtime.bind(SCALAR_MEDIA, table=classified, media=media)
+        launch = runtime.bind(
+            "volume/scalar_media.cl", "scalar_media", table=classified, media=media
+        )
         numbers = {"entries": table.entries, "low": table.low, "per_scalar": table.per_scalar}
         launch(padded(n, GROUP), GROUP, **numbers, first=first, count=n)
         runtime.finish()  # the table may be host memory in use
@@ -355,7 +324,8 @@ def _visibility(
     np.cumsum(transfer_function.opacities > 0, out=before[1:])
     with runtime.upload(before, "visible entries") as visible_before:
         launch = runtime.bind(
-            MACROCELL_VISIBILITY,
+            "volume/macrocells.cl",
+            "macrocell_visibility",
             voxels.variant.defines,
             ranges=voxels.ranges,
             macrocells=n,
@@ -383,7 +353,9 @@ def _distances(
     far = np.where(seen > 0, 0, _FARTHEST).astype(np.uint8)
     distances = runtime.upload(far, "empty macrocells")
     defines = voxels.variant.defines
-    launch = runtime.bind(MACROCELL_DISTANCES, defines, macrocells=seen.size, most=_FARTHEST)
+    launch = runtime.bind(
+        "volume/macrocells.cl", "macrocell_distances", defines, macrocells=seen.size, most=_FARTHEST
+    )
     apart = 1
     for along in macrocells_over(volume.dimensions):
         with distances as before:

@@ -10,10 +10,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.device import DeviceBuffer, Runtime, padded
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
-from pyvista_vdi.volume.kernels import AMBIENT_TRANSMITTANCES, STEP_OPACITIES
 from pyvista_vdi.volume.rays import Variant
-
-Triple = tuple[int, int, int]
 
 #: Nodes along x in a work-group.
 _GROUP = 32
@@ -24,7 +21,6 @@ _MOST_NODES = 2**31 - 1
 def ambient_transmittances(
     runtime: Runtime,
     grid: OcclusionGrid,
-    *,
     medium: Mapping[str, Any],
     variant: Variant,
     lengths: tuple[float, float],
@@ -35,122 +31,45 @@ def ambient_transmittances(
     ``lengths``: of the volume's own steps, and its opacity unit distance. DeviceMemoryError if the
     grid does not fit.
     """
-    opacities, ambient = _grids(runtime, grid)
-    with opacities:
-        runtime.fill(opacities, np.float32(0))
-        points = medium["classified"]["size"][:3]
-        where = (points, (0, 0, 0), grid.nodes, grid.margin, grid.padded)
-        _fill(runtime, grid, medium, variant, lengths, where, opacities)
-        macrocells = medium["classified"]["macrocells"]
-        _march(runtime, grid, opacities, medium["visible"], macrocells, variant, ambient)
-    return ambient
-
-
-def opacities_of_part(
-    runtime: Runtime,
-    grid: OcclusionGrid,
-    points: Triple,
-    first: Triple,
-    nodes: Triple,
-    *,
-    medium: Mapping[str, Any],
-    variant: Variant,
-    lengths: tuple[float, float],
-) -> NDArray[np.float32]:
-    """Return this part's share of the mean opacities of nodes, float32 (nz, ny, nx).
-
-    Parameters are those of :func:`ambient_transmittances`; ``points``: of the whole volume;
-    ``first``: the first of ``nodes``, both along x, y and z.
-    """
-    with runtime.buffer(nodes[::-1], name="opacities for ambient occlusion") as opacities:
-        where = (points, first, nodes, (0, 0, 0), nodes)
-        _fill(runtime, grid, medium, variant, lengths, where, opacities)
-        return runtime.download(opacities)
-
-
-def ambient_of_opacities(
-    runtime: Runtime, grid: OcclusionGrid, opacities: NDArray[np.float32]
-) -> NDArray[np.float32]:
-    """Return the mean transmittance around each node of which the opacities are known.
-
-    ``opacities``: float32 (nz, ny, nx), of the nodes without a margin.
-    """
-    around, ambient = _grids(runtime, grid)
-    margins = [(m, m) for m in grid.margin[::-1]]
-    with (
-        around,
-        ambient,
-        runtime.upload(np.pad(opacities, margins), "opacities for ambient occlusion") as known,
-        runtime.upload(np.ones(1, np.uint8), "visible macrocells") as visible,
-    ):
-        _march(runtime, grid, known, visible, (1, 1, 1, 0), Variant(), ambient)
-        return runtime.download(ambient)
-
-
-def _fill(
-    runtime: Runtime,
-    grid: OcclusionGrid,
-    medium: Mapping[str, Any],
-    variant: Variant,
-    lengths: tuple[float, float],
-    where: tuple[Any, Triple, Triple, Triple, Triple],
-    opacities: DeviceBuffer,
-) -> None:
-    """Fill in the mean opacities of the nodes' boxes.
-
-    ``where``: the grid's points, the first node, nodes, and those around them and in all.
-    """
     sample_distance, unit_distance = lengths
-    points, first, nodes, margin, in_all = where
-    launch = runtime.bind(STEP_OPACITIES, variant.defines, **medium, opacities=opacities)
-    launch(
-        (*padded(nodes[0], _GROUP), *nodes[1:]),
-        (_GROUP, 1, 1),
-        points=(*points, 0),
-        first_node=(*first, 0),
-        nodes=(*nodes, 0),
-        cell=(*grid.cell, 0),
-        samples=(*grid.samples, 0),
-        margin=(*margin, 0),
-        padded=(*in_all, 0),
-        units=sample_distance / unit_distance,
-        steps=grid.step / sample_distance,
-    )
-
-
-def _march(
-    runtime: Runtime,
-    grid: OcclusionGrid,
-    opacities: DeviceBuffer,
-    visible: DeviceBuffer,
-    macrocells: Any,
-    variant: Variant,
-    ambient: DeviceBuffer,
-) -> None:
-    """Fill in the mean transmittances around the nodes."""
-    directions, steps = grid.offsets.shape[:2]
+    file, items = "volume/ambient_occlusion.cl", (*padded(grid.nodes[0], _GROUP), *grid.nodes[1:])
+    nodes = {"nodes": grid.nodes, "cell": grid.cell, "margin": grid.margin, "padded": grid.padded}
+    shape: dict[str, Any] = {name: (*numbers, 0) for name, numbers in nodes.items()}
     places, shares = _taps(grid)
+    opacities, ambient = _grids(runtime, grid)
     with (
+        opacities,
         runtime.upload(places, "places of steps") as place_buffer,
         runtime.upload(shares, "weights of steps") as share_buffer,
     ):
-        launch = runtime.bind(AMBIENT_TRANSMITTANCES, variant.defines, opacities=opacities)
-        launch(
-            (*padded(grid.nodes[0], _GROUP), *grid.nodes[1:]),
+        # Fill in the mean opacities of the nodes' boxes
+        runtime.fill(opacities, np.float32(0))
+        fill = runtime.bind(file, "step_opacities", variant.defines, **medium, opacities=opacities)
+        fill(
+            items,
             (_GROUP, 1, 1),
-            nodes=(*grid.nodes, 0),
-            cell=(*grid.cell, 0),
-            margin=(*grid.margin, 0),
-            padded=(*grid.padded, 0),
-            visible=visible,
-            macrocells=macrocells,
+            **shape,
+            samples=(*grid.samples, 0),
+            units=sample_distance / unit_distance,
+            steps=grid.step / sample_distance,
+        )
+        # Fill in the mean transmittances around the nodes
+        march = runtime.bind(file, "ambient_transmittances", variant.defines, opacities=opacities)
+        directions, steps = grid.offsets.shape[:2]
+        march(
+            items,
+            (_GROUP, 1, 1),
+            **shape,
+            visible=medium["visible"],
+            macrocells=medium["classified"]["macrocells"],
             places=place_buffer,
             shares=share_buffer,
             directions=directions,
             steps=steps,
             ambient=ambient,
         )
-        runtime.finish()  # the tables may be host memory in use, and other queues read the result
+        runtime.finish()  # the tables may be host memory in use
+    return ambient
 
 
 def _grids(runtime: Runtime, grid: OcclusionGrid) -> tuple[DeviceBuffer, DeviceBuffer]:

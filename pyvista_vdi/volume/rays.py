@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import KernelDeclaration, Runtime
+from pyvista_vdi.device import Runtime
 from pyvista_vdi.device.constants import BLOCK_RAYS, GROUP
 from pyvista_vdi.device.programs import Define
 from pyvista_vdi.errors import InvalidArgumentError
@@ -197,7 +197,8 @@ class RayLaunch:
     def __init__(
         self,
         runtime: Runtime,
-        declaration: KernelDeclaration,
+        path: str,
+        name: str,
         defines: Mapping[str, Define],
         *,
         one_by_one: bool = False,
@@ -208,7 +209,7 @@ class RayLaunch:
             # PoCL rounds functions of a vector otherwise than of a number, in one of 10^5 values
             vector_functions = runtime.info.platform.startswith("Intel")
             defines = {**defines, "LANES": self._rays, "VECTOR_FUNCTIONS": vector_functions}
-        self._launch = runtime.bind(declaration, defines, **arguments)
+        self._launch = runtime.bind(path, name, defines, **arguments)
 
     def __call__(self, rays: int, **arguments: Any) -> None:
         """Launch it for so many rays, a multiple of a group's."""

@@ -17,7 +17,6 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import SAMPLE_BYTES, Room, StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.kernels import RENDER_VOLUME
 from pyvista_vdi.volume.rays import RayLaunch
 
 #: Steps of a ray that are sampled at a time where the volume is on the device brick by brick.
@@ -136,7 +135,8 @@ def draw_medium(
         draw = partial(
             RayLaunch,
             runtime,
-            RENDER_VOLUME,
+            "volume/render_volume.cl",
+            "render_volume",
             clipped.variant.defines,
             one_by_one=clipped.variant.one_by_one or bricks is not None,
             **medium_arguments,

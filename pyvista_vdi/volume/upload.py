@@ -21,7 +21,6 @@ from pyvista_vdi.model.lighting import Light, Lights, Shading
 from pyvista_vdi.model.transfer_function import GRADIENT_SHARE, TransferFunction
 from pyvista_vdi.model.volume import Geometry, Volume
 from pyvista_vdi.volume.bricks import Room, in_parts
-from pyvista_vdi.volume.kernels import MACROCELL_RANGES
 from pyvista_vdi.volume.rays import Variant
 
 T = TypeVar("T")
@@ -88,17 +87,6 @@ def held_voxels(
         return HeldVoxels(*upload_voxels(runtime, volume, scale, variant), scale, variant)
     ranges = upload_ranges(runtime, volume, scale, variant, room)
     return HeldVoxels(None, ranges, scale, variant)
-
-
-def voxel_bytes(volume: Volume, transfer_function: TransferFunction | None = None) -> int:
-    """Return the bytes of a scalar, or of a colour's component, on the device.
-
-    Scalars are taken to be read as they are where it is not known what for.
-    """
-    native = volume.array.dtype.name in _DEVICE_TYPES
-    if transfer_function is not None:
-        native = _suits_natively(volume, transfer_function)
-    return volume.array.dtype.itemsize if native else np.dtype(np.float32).itemsize
 
 
 def reads_natively(
@@ -206,19 +194,6 @@ def fits_whole(runtime: Runtime, volume: Volume, scale: Scale | None, room: Room
     return room.holds(runtime, device_bytes(volume, scale), other_bytes(volume), uploaded=uploaded)
 
 
-def volume_bytes(volume: Volume, nbytes: int, room: Room) -> tuple[int, int]:
-    """Return what a volume of ``nbytes`` on the device takes there, and its rays' samples, bytes.
-
-    What its macrocells and tables take is in it where there is a limit.
-    """
-    if room.limit is None:
-        return nbytes, 0
-    others = other_bytes(volume)
-    if nbytes + others + room.working <= room.limit:
-        return nbytes + others, 0
-    return room.limit - room.working - room.sample_bytes, room.sample_bytes
-
-
 def voxel_reader(scale: Scale | None) -> Callable[[NDArray[Any]], NDArray[Any]]:
     """Return what makes of voxels what the kernels read."""
     return (lambda part: part) if scale is None else (lambda part: _scaled(part, scale))
@@ -304,7 +279,9 @@ def _macrocell_ranges(
     macrocells = macrocells_over(dimensions)
     n = int(np.prod(macrocells))
     ranges = runtime.buffer((n, 2), name="ranges of macrocells")
-    launch = runtime.bind(MACROCELL_RANGES, variant.defines, voxels=voxels, ranges=ranges)
+    launch = runtime.bind(
+        "volume/macrocells.cl", "macrocell_ranges", variant.defines, voxels=voxels, ranges=ranges
+    )
     launch(padded(n, GROUP), (GROUP,), size=(*dimensions, 0), macrocells=(*macrocells, 0))
     return ranges
 

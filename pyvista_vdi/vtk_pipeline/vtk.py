@@ -14,7 +14,7 @@ import re
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
@@ -69,7 +69,7 @@ def __getattr__(name: str) -> Any:
     if not name.startswith(("vtk", "VTK", "numpy_to", "mutable", "reference", "calldata")):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:
-        value = import_module(f"{BACKEND}.{name}") if name in _MODULES.split() else _found(name)
+        value = _found(name)
     except ImportError as error:
         raise explain_import_error(error) from error
     globals()[name] = value
@@ -77,17 +77,13 @@ def __getattr__(name: str) -> Any:
 
 
 def _found(name: str) -> Any:
-    """Return what has a name in one of VTK's modules, or raise ImportError."""
-    first: ImportError | None = None
-    for home in _MODULES.split():
-        try:
+    """Return what has a name in one of VTK's modules, or the module of that name."""
+    for home in _MODULES.split() if name not in _MODULES else ():
+        with suppress(ImportError):  # a build may lack some
             module = import_module(f"{BACKEND}.{home}")
-        except ImportError as error:  # a build may lack some
-            first = first or error
-            continue
-        if hasattr(module, name):
-            return getattr(module, name)
-    raise first or ImportError(f"{BACKEND} has no {name}")
+            if hasattr(module, name):
+                return getattr(module, name)
+    return import_module(f"{BACKEND}.{name}")
 
 
 def weakly(thing: Any) -> Callable[[], Any]:

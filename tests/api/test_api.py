@@ -80,17 +80,6 @@ def test_vtk_objects_give_the_same_as_ours(volume, camera, default_runtime):
     assert np.array_equal(api.render(vdi_to_image(ours), camera), api.render(ours, camera))
 
 
-def test_estimate_says_bytes(volume):
-    needed = api.estimate(volume, (640, 480), max_supersegments=10)
-    assert needed.volume == volume.array.nbytes
-    assert needed.vdi_worst_case >= 640 * 480 * 10 * 24
-    assert needed.total == needed.volume + needed.vdi_worst_case + needed.working
-    # Scalars that are taken relative to their range are floats
-    counts = pvdi.Volume((60000 + np.arange(504).reshape(7, 8, 9) % 90).astype(np.uint16))
-    for clim, nbytes in ((None, 4 * 504), ((0, 60100), 2 * 504)):
-        assert api.estimate(counts, (64, 48), clim=clim).volume == nbytes
-
-
 def test_names_need_the_plot_extra(volume, camera, monkeypatch):
     monkeypatch.setattr(classification, "find_spec", lambda name: None)
     message = r'not installed: install it by pip install "pyvista-vdi\[plot\]", or pass transfer_fu'

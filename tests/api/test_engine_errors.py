@@ -10,7 +10,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from drawing import generate_vdi, raycast_volume
-from runtimes import fresh_runtime
 
 from pyvista_vdi import Camera, TransferFunction, Volume
 from pyvista_vdi.errors import (
@@ -18,7 +17,6 @@ from pyvista_vdi.errors import (
     DeviceMemoryError,
     InvalidArgumentError,
 )
-from pyvista_vdi.generation.slices import estimate
 
 WINDOW = (12, 9)
 CAMERA = Camera((3.5, 3.5, 30), (3.5, 3.5, 3.5), (0, 1, 0))
@@ -84,24 +82,6 @@ def test_a_volume_too_large_is_named(runtime, make, draw, monkeypatch):
     del volume  # with which what is known of it is kept
     gc.collect()
     assert runtime.allocated == before
-
-
-@pytest.mark.parametrize(
-    ("dtype", "window", "limit"),
-    [(np.uint8, (64, 48), 20), (np.float32, (37, 5), 1), (np.float64, (16, 16), 300)],
-)
-def test_the_estimate_bounds_what_is_taken(runtime, dtype, window, limit):
-    volume = some_volume(24, dtype)
-    stated = estimate(volume, window, max_supersegments=limit)
-    camera = Camera((11.5, 11.5, 90), (11.5, 11.5, 11.5), (0, 1, 0))
-    own = fresh_runtime(runtime)
-    vdi = generate_vdi(volume, camera, window, TRANSFER, max_supersegments=limit, device=own)
-    taken = own.peak_allocated
-    # Beside it only what is small: forms, table, and 9 bytes for each block of 8 x 8 x 8 points
-    assert taken <= stated.volume + stated.working + 2**14
-    assert taken >= stated.working / 4
-    assert vdi.nbytes <= stated.vdi_worst_case
-    assert stated.total == stated.volume + stated.vdi_worst_case + stated.working
 
 
 @pytest.fixture

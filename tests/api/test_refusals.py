@@ -71,7 +71,6 @@ def doors(name, value):
     of_names = {
         "generate": made,
         "render_volume": made,
-        "estimate": {"volume": VOLUME, "window_size": SIZE},
         "render": drawn,
         "render_depth": drawn,
         "pick": {**drawn, "pixel": (0, 0)},

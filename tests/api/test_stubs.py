@@ -27,7 +27,6 @@ HOMES = (collections.abc, typing, npt, types)
 CLASSES = {
     "AmbientOcclusion": "model.ambient_occlusion",
     "DeferredVDI": "model.deferred",
-    "Estimate": "generation.slices",
     "Pick": "raycasting.picking",
     "Settings": "api",
     "TransferFunction": "model.transfer_function",

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from pyvista_vdi.device import (
-    KernelDeclaration,
     programs,
 )
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError
@@ -30,12 +29,12 @@ __kernel void affine(
 @pytest.fixture
 def affine(monkeypatch):
     monkeypatch.setattr(programs, "expand", lambda path: SOURCE)
-    return KernelDeclaration("affine.cl", "affine")
+    return "affine.cl", "affine"
 
 
 def test_wrong_arguments_are_refused_by_name(runtime, affine):
     with runtime.buffer((8,), name="eight") as y, runtime.buffer((8,), np.int32) as integers:
-        launch = runtime.bind(affine, {"T": "float"}, x=None, y=y)
+        launch = runtime.bind(*affine, {"T": "float"}, x=None, y=y)
         with pytest.raises(
             InvalidArgumentError, match=r"'affine' of affine\.cl was .*without.*by, shift, room"
         ):

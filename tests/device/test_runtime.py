@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from runtimes import fresh_runtime
 
-from pyvista_vdi import device as ocl
 from pyvista_vdi.device import devices, programs
 from pyvista_vdi.errors import KernelBuildError
 
@@ -40,11 +39,6 @@ __kernel void spread(__global const float *x, __global float *y, const float4 v,
 """
 
 
-def scaling(path):
-    """The kernel ``scale`` of a file."""
-    return ocl.KernelDeclaration(path, "scale")
-
-
 @pytest.fixture
 def scale_file(tmp_path):
     path = tmp_path / "with a space" / "scale.cl"
@@ -59,7 +53,7 @@ def test_build_error_names_file_and_line(runtime, texts, monkeypatch, tmp_path):
     wrong = "".join(f"    missing_it{n}();\n" for n in range(40))
     texts["vdi/bad.cl"] = f'#include "common/good.cl"\n\n__kernel void bad()\n{{\n{wrong}}}\n'
     with pytest.raises(KernelBuildError) as caught:
-        runtime.kernel(ocl.KernelDeclaration("vdi/bad.cl", "bad"), {"N": 3})
+        runtime.kernel("vdi/bad.cl", "bad", {"N": 3})
     error = caught.value
     assert "vdi/bad.cl:5" in error.log
     assert "missing_it0" in str(error)
@@ -83,21 +77,20 @@ def test_programs_are_built_once_per_source_and_defines(runtime, scale_file, mon
     built = []
     build = programs.build
     monkeypatch.setattr(programs, "build", lambda *a: built.append(a[4]) or build(*a))
-    first = runtime.kernel(scaling(scale_file), {"ADD": 0.25})
-    assert runtime.kernel(scaling(scale_file), {"ADD": 0.25}) is first
-    assert runtime.kernel(scaling(scale_file), {"ADD": 0.5}) is not first
-    runtime.kernel(ocl.KernelDeclaration(scale_file, "spread"), {"ADD": 0.5})
+    first = runtime.kernel(scale_file, "scale", {"ADD": 0.25})
+    assert runtime.kernel(scale_file, "scale", {"ADD": 0.25}) is first
+    assert runtime.kernel(scale_file, "scale", {"ADD": 0.5}) is not first
+    runtime.kernel(scale_file, "spread", {"ADD": 0.5})
     assert len(built) == 2
     scale_file.write_text(SCALE + "\n// edited\n")
-    assert runtime.kernel(scaling(scale_file), {"ADD": 0.25}) is not first
+    assert runtime.kernel(scale_file, "scale", {"ADD": 0.25}) is not first
 
 
 def test_a_launch_takes_every_kind_of_argument_of_its_own(runtime, scale_file):
     """Also signs of 0, arrays changed in place, buffers in the place of those that have gone."""
-    spread = ocl.KernelDeclaration(scale_file, "spread")
     vector = np.array([1, 2, 3, 4], np.float32)
     with runtime.upload(np.arange(8, dtype=np.float32)) as x, runtime.buffer(x.shape) as y:
-        launch = runtime.bind(spread, {"ADD": 0}, x=x, y=y, v=vector, t=4)
+        launch = runtime.bind(scale_file, "spread", {"ADD": 0}, x=x, y=y, v=vector, t=4)
         launch(8, 4)
         np.testing.assert_array_equal(runtime.download(y), [3, 2, 1, 0, 7, 6, 5, 4])
         launch.set(x=None)
@@ -107,7 +100,7 @@ def test_a_launch_takes_every_kind_of_argument_of_its_own(runtime, scale_file):
             assert runtime.download(y).tobytes() == np.full(8, last, np.float32).tobytes()
         launch(8, 4, x=x)
         np.testing.assert_array_equal(runtime.download(y), [3, 2, 1, 0, 7, 6, 5, 4])
-    launch = runtime.bind(scaling(scale_file), {"ADD": 0}, factor=2, n=3)
+    launch = runtime.bind(scale_file, "scale", {"ADD": 0}, factor=2, n=3)
     for value in range(1, 6):
         with runtime.buffer((3,)) as x:
             runtime.fill(x, np.float32(value))
@@ -120,7 +113,7 @@ def new_kernel(tmp_path):
     """A file that no cache knows."""
     path = tmp_path / "new.cl"
     path.write_text(f"// {tmp_path}\n__kernel void twice(__global float *x) {{ *x *= 2; }}")
-    return ocl.KernelDeclaration(path, "twice")
+    return path
 
 
 def test_compiled_programs_are_kept_and_what_is_damaged_is_compiled_again(
@@ -136,7 +129,7 @@ def test_compiled_programs_are_kept_and_what_is_damaged_is_compiled_again(
 
     def compiled():
         before = len(told)
-        fresh_runtime(runtime).kernel(new_kernel, {})
+        fresh_runtime(runtime).kernel(new_kernel, "twice", {})
         return len(told) - before
 
     assert compiled() == 1

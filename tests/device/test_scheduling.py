@@ -182,7 +182,7 @@ def test_launches_in_pieces_cover_everything_once(runtime, kernels, monkeypatch,
     with runtime.buffer((n,), np.uint32) as x:
         with runtime.background():
             runtime.fill(x, 0)
-            runtime.bind(ocl.KernelDeclaration(kernels, "index"), x=x, wide=size[0])(size, group)
+            runtime.bind(kernels, "index", x=x, wide=size[0])(size, group)
         np.testing.assert_array_equal(runtime.download(x), np.arange(1, n + 1))
     assert sum(pieces) == n
     assert n <= 4096 or len(pieces) > 1

@@ -179,9 +179,15 @@ def same(script, judge, way, drawn, what):
 
 
 @pytest.mark.filterwarnings("ignore::pyvista_vdi.errors.VDIWarning")  # VDIs made inside a volume
-@pytest.mark.every(25)
-@pytest.mark.parametrize("way", ["auto", "volume", "vdi"])
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize(
+    ("seed", "way"),
+    [
+        pytest.param(
+            seed, ("auto", "volume", "vdi")[seed % 3], marks=[pytest.mark.slow] * (seed > 8)
+        )
+        for seed in range(100)
+    ],
+)
 def test_every_picture_is_as_with_add_volume(seed, way, record_property, default_runtime):
     def with_add_vdi(plotter, volume, **how):
         return plotter.add_vdi(volume, draw=way, interpolation="linear", **how)

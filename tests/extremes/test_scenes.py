@@ -158,7 +158,6 @@ SCALARS = {
     "checkerboard": (CHECKERS, "float32", 0, 1),
     "int16 full range": ((FIELD - 0.5) * 65535, "int16", -32768, 32767),
     "uint32 full range": (FIELD * 4.2e9, "uint32", 0, 2**32 - 1),
-    "uint16 between values": (60000 + FIELD * 100, "uint16", 60000.3, 60002.7),
     "float32 one denormal": (FIELD * 1.4e-44, "float32", 0, 1.4e-44),
     "float32 both ends": ((FIELD - 0.5) * 6.7e38, "float32", -3.35e38, 3.35e38),
     "float32 a Kelvin": (300 + FIELD * 0.02, "float32", 300.001, 300.019),
@@ -171,10 +170,7 @@ SCALARS = {
 def test_scalars(runtime, worst, name):
     values, dtype, low, high = SCALARS[name]
     values = np.round(values) if dtype[0] in "ui" else values
-    interpolations = ["nearest", "linear"] if dtype == "float32" and high == 1 else ["linear"]
-    for interpolation in interpolations:
-        function = transfer(low, high, interpolation=interpolation)
-        check(runtime, worst, Volume(values.astype(dtype)), function)
+    check(runtime, worst, Volume(values.astype(dtype)), transfer(low, high))
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def test_an_axis_longer_than_a_3d_texture_s(runtime, worst, axis):
     """The end of 20000 voxels along an axis, where many drivers' textures have 2048."""
     n, size = 20000, [4, 4, 4]
     size[2 - axis] = n
-    array = np.moveaxis(np.zeros(size, np.uint8), 2 - axis, 0)
+    array = np.moveaxis(np.zeros(size, np.float32), 2 - axis, 0)
     array[-6:] = np.random.default_rng(axis).integers(50, 200, array[-6:].shape)
     volume = Volume(np.ascontiguousarray(np.moveaxis(array, 0, 2 - axis)))
     start = [0, 0, 0]
@@ -83,7 +83,7 @@ def test_an_axis_longer_than_a_3d_texture_s(runtime, worst, axis):
 
 def test_what_one_allocation_does_not_hold_goes_brick_by_brick(runtime, monkeypatch):
     rng = np.random.default_rng(5)
-    volume = Volume(rng.integers(0, 256, (96, 96, 300), np.uint8))
+    volume = Volume(255 * rng.random((96, 96, 300), np.float32))
     camera, function = view(volume), transfer(0, 255)
     image = raycast_volume(volume, camera, WINDOW, function, device=runtime)
     vdi = generate_vdi(volume, camera, WINDOW, function, device=runtime)

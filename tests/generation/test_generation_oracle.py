@@ -126,12 +126,9 @@ def check_case(runtime, seed, dtype, interpolation, direction, criterion, budget
     ("dtype", "interpolation", "direction", "criterion", "budget"),
     [
         ("uint8", "nearest", "none", "homogeneity", 2),
-        ("uint8", "linear", "rotated", "least-error", 7),
-        ("int8", "linear", "mirrored", "least-error", 20),
         ("uint16", "linear", "none", "least-error", 1),
-        ("int16", "nearest", "rotated", "least-error", 1),
-        ("int32", "linear", "rotated", "homogeneity", 20),
-        ("uint32", "nearest", "mirrored", "least-error", 3),
+        ("int16", "nearest", "rotated", "least-error", 7),
+        ("int32", "linear", "mirrored", "homogeneity", 20),
         ("float32", "nearest", "mirrored", "homogeneity", 7),
         ("float64", "linear", "none", "least-error", 64),
     ],
@@ -161,7 +158,7 @@ def test_any_scene(default_runtime, **scene):
 def test_data_of_many_runs_per_list(runtime):
     """Which are cut where they could stay."""
     for criterion in CRITERIA:
-        check_against_reference(runtime, 2500, noise(2500, 12, "nearest"), 4, criterion)
+        check_against_reference(runtime, 2500, noise(2500, 12, "linear"), 4, criterion)
 
 
 def test_homogeneity_cuts_where_the_reference_does(runtime):

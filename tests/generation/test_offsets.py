@@ -7,8 +7,6 @@ import contextlib
 import numpy as np
 import pytest
 
-from pyvista_vdi.generation.kernels import LIST_OFFSETS, SUM_LENGTHS
-
 LISTS_PER_ITEM = 16  # see generation/offsets.cl
 UNTOUCHED = np.uint64(0xA5A5A5A5A5A5A5A5)
 
@@ -31,8 +29,10 @@ def summed(runtime, slices, group):
     ):
         runtime.write(offsets, room)
         shared = {"partial": group, "sums": sums}
-        sum_lengths = runtime.bind(SUM_LENGTHS, **shared)
-        list_offsets = runtime.bind(LIST_OFFSETS, **shared, all_offsets=offsets)
+        sum_lengths = runtime.bind("generation/offsets.cl", "sum_lengths", **shared)
+        list_offsets = runtime.bind(
+            "generation/offsets.cl", "list_offsets", **shared, all_offsets=offsets
+        )
         made = 0
         for lengths in slices:
             blocks = -(-len(lengths) // (group * LISTS_PER_ITEM))

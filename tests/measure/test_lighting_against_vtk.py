@@ -71,9 +71,10 @@ def coloured(volume):
     return Volume(colors, volume.spacing, volume.origin, volume.direction)
 
 
-@pytest.mark.every(2)
 @pytest.mark.gl
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (k % 2)) for k, n in enumerate(CASES)]
+)
 def test_pictures_are_those_of_vtk(name, default_runtime):
     pytest.importorskip("pyvista")
     from pyvista_vdi.measure.vtk_mappers import VTKMapper

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyvista_vdi import AmbientOcclusion, Volume, api
+from pyvista_vdi import AmbientOcclusion, Volume
 from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
+from pyvista_vdi.model.options import GenerationOptions
 
 
 def grid_of(shape, radius, spacing=(1, 1, 1), direction=None):
@@ -29,10 +30,8 @@ def test_every_voxel_lies_between_nodes_and_every_step_within_the_margin():
     np.testing.assert_allclose(length, 30 - grid.step / 2)
 
 
-def test_its_memory_is_part_of_the_estimate():
+def test_its_memory_is_known():
     volume = Volume(np.zeros((60, 60, 60), np.uint8))
-    plain = api.estimate(volume, (64, 48))
-    occluded = api.estimate(volume, (64, 48), ambient_occlusion=4.0)
-    assert plain.occlusion == 0
-    assert occluded.occlusion == 4 * (60**3 + 68**3)  # the nodes, and they with a margin of 4
-    assert occluded.total == plain.total + occluded.occlusion
+    assert GenerationOptions().occlusion_bytes(volume) == 0
+    taken = GenerationOptions(ambient_occlusion=4.0).occlusion_bytes(volume)
+    assert taken == 4 * (60**3 + 68**3)  # the nodes, and they with a margin of 4

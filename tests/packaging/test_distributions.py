@@ -70,13 +70,9 @@ def _installed_name(name):
     return None
 
 
-def _assert_same(found, expected):
-    assert found == expected, f"missing: {expected - found}, superfluous: {found - expected}"
-
-
 def test_wheel_holds_the_package_and_nothing_else(source, wheel):
     expected = {_installed_name(name) for name in source[1]} - {None}
-    _assert_same({name for name in wheel if ".dist-info/" not in name}, expected)
+    assert {name for name in wheel if ".dist-info/" not in name} == expected
 
 
 def test_wheel_metadata_and_entry_points(wheel):
@@ -95,8 +91,7 @@ def test_wheel_metadata_and_entry_points(wheel):
     # the engine runs on machines without these
     assert required.isdisjoint({"vtk", "pyvista", "matplotlib", "pydicom", "intel-opencl-rt"})
     assert "pyvista-vdi = pyvista_vdi.cli:main" in entry_points
-    _, components = entry_points.split("[pyvista.plotter_components]\n")
-    assert "add_vdi = pyvista_vdi.plotting.component\n" in components.split("\n\n")[0] + "\n"
+    assert "\nadd_vdi = pyvista_vdi.plotting.component\n" in entry_points
 
 
 def test_sdist_holds_the_repository(source, tmp_path):
@@ -104,7 +99,7 @@ def test_sdist_holds_the_repository(source, tmp_path):
     with tarfile.open(archive) as tar:
         found = {name.partition("/")[2] for name in tar.getnames() if tar.getmember(name).isfile()}
     found = {name for name in found if ".egg-info/" not in name}
-    _assert_same(found - {"PKG-INFO", "setup.cfg"}, source[1] - {".gitattributes"})
+    assert found - {"PKG-INFO", "setup.cfg"} == source[1] - {".gitattributes"}
 
 
 def test_editable_install_finds_the_kernels(source, tmp_path):
@@ -138,13 +133,3 @@ assert pyvista_vdi.__file__.startswith({str(copy)!r}), pyvista_vdi.__file__
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert result.returncode == 0, result.stderr
-
-
-def test_one_version(source):
-    copy, _ = source
-    for name, pattern in (
-        ("CITATION.cff", r"^version: (\S+)$"),
-        ("tools/conda/recipe.yaml", r'^  version: "(\S+)"$'),
-    ):
-        text = (copy / name).read_text(encoding="utf-8")
-        assert re.findall(pattern, text, re.MULTILINE) == [pyvista_vdi.__version__], name

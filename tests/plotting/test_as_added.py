@@ -83,8 +83,13 @@ def swapped(plotter, actor, other):
     return shown(plotter)
 
 
-@pytest.mark.every(6)
-@pytest.mark.parametrize(("arguments", "change"), CHANGES.values(), ids=CHANGES)
+@pytest.mark.parametrize(
+    ("arguments", "change"),
+    [
+        pytest.param(*case, id=name, marks=[pytest.mark.slow] * (k % 6 > 0))
+        for k, (name, case) in enumerate(CHANGES.items())
+    ],
+)
 def test_changes_of_the_grid_show_where_add_volume_s_show(arguments, change):
     seen = []
     for method in ("add_volume", "add_vdi"):
@@ -142,7 +147,6 @@ PROPERTIES = {
 }
 
 
-@pytest.mark.every(3)
 @pytest.mark.parametrize("change", PROPERTIES.values(), ids=PROPERTIES)
 def test_a_copy_s_properties_are_its_own(plotter, change):
     actor = plotter.add_vdi(ramp(), draw="vdi", **LOOKS)

@@ -143,7 +143,6 @@ def scripts():
 
 
 @documented
-@pytest.mark.every(3)
 @pytest.mark.parametrize("name", [*scripts()])
 def test_a_script_of_the_gallery_writes_its_picture(name, tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "agg")

@@ -102,5 +102,3 @@ def test_a_plot_that_is_refused_leaves_no_plotter():
     with pytest.raises(TypeError, match="'opcity': did you mean 'opacity'"):
         soft_ball(8).vdi.plot(off_screen=True, opcity=1)
     assert before == _ALL_PLOTTERS
-
-

@@ -39,9 +39,9 @@ def beside() -> pv.PolyData:
     return pv.Sphere(radius=0.5, center=(0.5, 0.7, 0.5), theta_resolution=12, phi_resolution=12)
 
 
-@pytest.mark.every(2)
-@pytest.mark.parametrize("kind", [vtkPropAssembly, vtkAssembly])
-@pytest.mark.parametrize("how", ["one", "nested", "two"])
+@pytest.mark.parametrize(
+    ("kind", "how"), [(vtkPropAssembly, "one"), (vtkPropAssembly, "nested"), (vtkAssembly, "two")]
+)
 def test_parts_of_an_assembly_are_drawn(kind, how):
     """All of them, and what they end at: the assembly is not asked while it walks its parts."""
 
@@ -106,5 +106,3 @@ def test_shadows_are_drawn_as_over_a_volume():
     judge = seen_under(Plotter.enable_shadows, add_judge)
     ours = seen_under(Plotter.enable_shadows, add_ours)
     assert np.abs(ours - judge).max() <= TOLERANCE
-
-

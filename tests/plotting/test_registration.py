@@ -35,14 +35,8 @@ print("all well")
 """
 
 
-@pytest.mark.every(3)
 @pytest.mark.parametrize(
-    "imports",
-    [
-        "import pyvista_vdi",
-        "import pyvista.plotting, pyvista_vdi",
-        "import pyvista; pyvista.ImageData().vdi",
-    ],
+    "imports", ["import pyvista_vdi", "import pyvista; pyvista.ImageData().vdi"]
 )
 def test_any_plotter_has_it_once_the_package_is_imported(imports):
     done = run_python(WIDGET.format(imports=imports))

@@ -25,8 +25,7 @@ def ball_and_sphere(plotter, add):
     opaque_sphere(plotter)
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("lighting", ["light kit", "three lights", "none"])
+@pytest.mark.parametrize("lighting", ["light kit", "none"])
 def test_shaded_by_the_plotter_s_lights(lighting):
     def scene(plotter, add):
         add(plotter, soft_ball(), shade=True, ambient=0.2, specular=0.5, specular_power=15)
@@ -35,7 +34,6 @@ def test_shaded_by_the_plotter_s_lights(lighting):
     assert_as_vtk(scene, lighting=lighting)
 
 
-@pytest.mark.every(3)
 @pytest.mark.parametrize("shade", [False, True])
 def test_rgba_scalars(shade):
     ball = soft_ball()
@@ -79,8 +77,7 @@ def test_stereo(eye):
     assert_as_vtk(scene, strays=3)
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("lighting", ["light kit", "three lights", "none"])
+@pytest.mark.parametrize("lighting", ["light kit", "none"])
 def test_lights_that_move_with_the_camera_make_no_vdi(lighting):
     """VTK writes the eye of each frame into its headlights: they are the same lights."""
     plotter = pv.Plotter(window_size=WINDOW, lighting=lighting)

@@ -62,8 +62,7 @@ def cropped(regions, *, planes=PLANES, direction=(1.0, 0.7, 0.5), **more):
     return scene
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("regions", [*PRESETS, 0x5A3C12F, 0x10D42B7, 0x2F81E05])
+@pytest.mark.parametrize("regions", [*[*PRESETS][::3], 0x5A3C12F])
 def test_regions_are_vtks(regions):
     assert_as_vtk(cropped(regions))
 

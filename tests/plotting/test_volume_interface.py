@@ -125,8 +125,10 @@ class Shown:
         return self.plotter.screenshot(return_img=True).astype(int)
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize("name", CHANGES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (k % 3 > 0)) for k, name in enumerate(CHANGES)],
+)
 def test_a_change_is_seen_as_with_add_volume(closed, name):
     pictures = []
     for how in ("add_volume", "add_vdi"):

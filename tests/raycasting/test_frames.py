@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import strategies
 from drawing import render_vdi
 from oracle import TOLERANCE
+from ray_scenes import reciprocal_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.device import aligned_empty
@@ -17,7 +17,7 @@ SIZE = (31, 17)
 
 def seen_from_beside(seed):
     """A VDI, and a view in which rays cross many lists: they end between two."""
-    vdi = strategies.random_vdi(np.random.default_rng([seed, 900]))
+    vdi = reciprocal_vdi(np.random.default_rng([seed, 900]))
     return vdi, vdi.camera.azimuth(50)
 
 

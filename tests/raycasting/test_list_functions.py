@@ -10,7 +10,7 @@ import itertools
 
 import numpy as np
 
-from pyvista_vdi.raycasting.kernels import RAYCAST
+from pyvista_vdi.device.programs import parameters_of
 
 FILE = "list_functions.cl"
 
@@ -71,7 +71,7 @@ def test_small_lists_exhaustively(call):
 
 
 def test_a_frame_lies_on_the_device_as_on_the_host(call):
-    frame = RAYCAST.parameters({})["frame"].dtype
+    frame = parameters_of("raycasting/raycast.cl", "raycast", {})["frame"].dtype
     expected = [*(frame.fields[name][1] for name in frame.names), frame.itemsize]
     found = call(FILE, "frame_layout", len(expected), call.empty(len(expected), dtype=np.int32))
     assert found.tolist() == expected

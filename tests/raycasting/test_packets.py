@@ -66,7 +66,7 @@ def drawn_by(runtime, scene):
     """Which kernel draws a scene, and how many rays a work-item of it follows."""
     variant = choose(runtime, scene)
     assert len(variant.switches) <= 8
-    return f"{variant.kernel.name} {variant.rays}"
+    return f"{variant.kernel[1]} {variant.rays}"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import reference
 import strategies
-from ray_scenes import random_cropping, random_ends
+from ray_scenes import random_cropping, random_ends, reciprocal_vdi
 from reference import raycast as oracle
 
 import pyvista_vdi as pvdi
@@ -32,7 +32,7 @@ def cases(kind):
     """VDIs, views of them, and every fourth of the pixels."""
     for case in range(4):
         rng = np.random.default_rng([case, strategies.VIEWS.index(kind)])
-        vdi = strategies.random_vdi(rng)
+        vdi = reciprocal_vdi(rng)
         camera, size = strategies.random_view(rng, vdi, kind)
         pixels = [(i % size[0], i // size[0]) for i in range(case, size[0] * size[1], 4)]
         yield vdi, camera, size, pixels
@@ -147,7 +147,7 @@ def test_options_reach_the_kernel(runtime):
     rng = np.random.default_rng(5)
     compared = 0
     for _ in range(6):
-        vdi = strategies.random_vdi(rng)
+        vdi = reciprocal_vdi(rng)
         camera, size = strategies.random_view(rng, vdi, "around")
         ends = random_ends(rng, vdi, camera, size)
         ends["cropping"] = random_cropping(rng, vdi.bounds, int(rng.integers(pvdi.Cropping.ALL)))

@@ -7,7 +7,7 @@ import pytest
 import strategies
 from drawing import render_vdi
 from extreme_scenes import slabs_vdi
-from ray_scenes import random_planes, rebuilt
+from ray_scenes import random_planes, rebuilt, reciprocal_vdi
 from reference.raycast import centre_ray_scale
 
 from pyvista_vdi.model.standard_cases import filling_camera
@@ -46,7 +46,7 @@ def test_a_homogeneous_medium_is_exact_with_any_number_of_samples(runtime, paral
 def test_more_samples_come_closer_to_the_full_frame(runtime, seed):
     """Whole, and of what cropping and the opacity multiplier leave of it."""
     rng = np.random.default_rng(seed)
-    vdi = strategies.random_vdi(rng, max_supersegments=5, thinnest=0.05)
+    vdi = reciprocal_vdi(rng, max_supersegments=5, thinnest=0.05)
     view, size = strategies.random_view(rng, vdi, "near")
     shown = {"device": runtime}
     if seed:

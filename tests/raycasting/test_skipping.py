@@ -38,12 +38,11 @@ def _skipping_is_forced(monkeypatch):
 #: of tiles, by pixels two tiles high; and the middle column of rays through corners of lists.
 SCENES = [
     ("perspective", 1.0, 30, "blocks"),
+    ("inside", 0.0, 180, "blocks"),
     ("parallel", 1.0, ((0, 0, -1), (0, 1, 0), (96, 80)), "one by one"),
-    ("parallel", 1.0, ((math.sqrt(0.5), -math.sqrt(0.5), 0), (0, 0, 1), (95, 75)), "packets"),
-    ("long lens", 1e-3, 60, "blocks"),
-    ("very long lens", 1.0, 90, "one by one"),
-    ("inside", 0.0, 180, "packets"),
-    ("perspective", 30.0, ((0, 0, 1), (0, 1, 0), (96, 160 // (2 * STACK))), "one by one"),
+    ("parallel", 1.0, ((math.sqrt(0.5), -math.sqrt(0.5), 0), (0, 0, 1), (95, 75)), "one by one"),
+    ("parallel", 1.0, ((0, 0, 1), (0, 1, 0), (96, 160 // (2 * STACK))), "one by one"),
+    ("very long lens", 1.0, 90, "packets"),
 ]
 
 

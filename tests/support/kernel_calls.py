@@ -6,7 +6,8 @@ from contextlib import ExitStack
 
 import numpy as np
 
-from pyvista_vdi.device import KernelDeclaration, padded
+from pyvista_vdi.device import padded
+from pyvista_vdi.device.programs import parameters_of
 
 GROUP = 64
 
@@ -53,9 +54,9 @@ class Caller:
                 elif isinstance(argument, np.ndarray) and place not in by_value:
                     value = stack.enter_context(self._runtime.upload(argument))
                 given.append(value)
-            declaration = KernelDeclaration(self._folder / file, kernel)
-            named = dict(zip(declaration.parameters(defines), given, strict=True))
-            launch = self._runtime.bind(declaration, defines, **named)
+            path = self._folder / file
+            named = dict(zip(parameters_of(path, kernel, defines), given, strict=True))
+            launch = self._runtime.bind(path, kernel, defines, **named)
             launch(padded(items, GROUP), GROUP)
             results = [self._runtime.download(buffer) for buffer in written]
         return results[0] if len(results) == 1 else results

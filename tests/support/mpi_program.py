@@ -33,10 +33,10 @@ def own_block(volume, rank):
 
 
 def same(folder):
-    """Write the VDI of four blocks, with gradients and occlusion, which need others' points."""
+    """Write the VDI of four blocks, with gradients, which need others' points."""
     volume = volume_of("uint8")
     function = transfer_for(volume, "linear", gradient_opacities=[0.2, 1], gradient_range=(0, 30))
-    options = {"max_supersegments": 8, "ambient_occlusion": 8.0, "precision": "exact"}
+    options = {"max_supersegments": 8, "precision": "exact"}
     options |= {"transfer_function": function, "comm": COMM}
     camera = VIEWS["all of it"](volume)
     with InSitu(folder / "mpi.vdis", camera, WINDOW, volume.dimensions, **options) as show:

@@ -10,7 +10,6 @@ import pyvista as pv
 from settings import with_settings
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkWindowToImageFilter
 
 #: Everything both sides need: soft, so that the step along the ray decides nothing.
 LOOKS: dict[str, Any] = {
@@ -91,19 +90,6 @@ def shown(plotter: pv.Plotter) -> np.ndarray:
     plotter.show(auto_close=False)
     plotter.render()
     return np.asarray(plotter.screenshot(return_img=True))[..., :3].astype(int)
-
-
-def tiled_picture(plotter: pv.Plotter) -> np.ndarray:
-    """What VTK's filter puts together of four frames: a picture of twice the size."""
-    plotter.show(auto_close=False)
-    tiles = vtkWindowToImageFilter()
-    tiles.SetInput(plotter.render_window)
-    tiles.SetScale(2, 2)
-    tiles.ReadFrontBufferOff()
-    tiles.Update()
-    width, height, _ = tiles.GetOutput().GetDimensions()
-    values = vtk_to_numpy(tiles.GetOutput().GetPointData().GetScalars())
-    return values.reshape(height, width, 3)[::-1]
 
 
 def draw(

@@ -42,6 +42,14 @@ def generating_view(rng, kind, zoom=1.0):
     )
 
 
+def reciprocal_vdi(rng, bounds=None, **options):
+    """A random VDI of a perspective view from near by, whose depths are all of one form."""
+    bounds = strategies.random_bounds(rng) if bounds is None else bounds
+    transform = strategies.random_transform(rng)
+    camera = strategies.camera_around(rng, bounds, transform, distance=2, parallel=False)
+    return strategies.random_vdi(rng, camera=camera, bounds=bounds, **options)
+
+
 def random_ends(rng, vdi, camera, size, planes=1):
     """Opaque depths, some infinite and some before everything, and clipping planes."""
     near, far = strategies.view_depths(camera, vdi.bounds)

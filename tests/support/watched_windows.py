@@ -69,9 +69,8 @@ def no_estimates(monkeypatch):
         def __init__(self, *_, **__):
             pass
 
-        def estimate(self, vdi, camera, size, *shown, **more):
+        def estimate(self, *_, **__):
             answer.asked += 1
-            answer.camera, answer.shown = camera, shown
             return ViewError(answer.ssim, 0.0, 1.0, 1)
 
     monkeypatch.setattr(making, "ViewErrorEstimator", Estimator)

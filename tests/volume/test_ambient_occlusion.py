@@ -82,14 +82,14 @@ def test_pictures_are_the_reference_s(runtime):
     np.testing.assert_allclose(reference.render(own, camera), expected, atol=1e-5)
 
 
-@pytest.mark.parametrize("more", ["gradient opacity", "shading", "RGBA"])
+@pytest.mark.parametrize("more", ["gradients", "RGBA"])
 def test_with_everything_else_as_well(runtime, more):
     volume, camera, function, occlusion = case(7)
     low, high = volume.finite_range()
     gradient = {"gradient_opacities": [0, 1], "gradient_range": (0, (high - low) / 4)}
+    gradient["shading"] = Shading(0.3, 0.6, 0.4, 5)
     changes = {
-        "gradient opacity": gradient,
-        "shading": {"shading": Shading(0.3, 0.6, 0.4, 5)},
+        "gradients": gradient,
         "RGBA": {"scalar_range": (0, 255)},
     }
     function = function.replace(**changes[more])

@@ -158,7 +158,6 @@ def test_a_style_starts_and_ends_an_interaction(coarsest):
 def test_vtks_switches_turn_previews_off_and_bound_them(plotter, coarsest):
     actor = watched(plotter)
     mapper = actor.mapper
-    assert mapper.GetInteractiveUpdateRate() == 1.0
     assert mapper.GetAutoAdjustSampleDistances()
 
     def share():
@@ -169,9 +168,6 @@ def test_vtks_switches_turn_previews_off_and_bound_them(plotter, coarsest):
     mapper.AutoAdjustSampleDistancesOff()
     assert share() == 1.0
     mapper.AutoAdjustSampleDistancesOn()
-    mapper.SetInteractiveUpdateRate(MOVING + 1)
-    assert share() == 1.0
-    mapper.SetInteractiveUpdateRate(MOVING)
     mapper.SetMaximumImageSampleDistance(2.0)
     assert share() == pytest.approx(0.25, abs=0.01)
     mapper.SetMaximumImageSampleDistance(10.0)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from functools import partial
 from itertools import pairwise, zip_longest
-from operator import attrgetter, getitem
+from operator import getitem
 from typing import Any
 
 import numpy as np
@@ -93,11 +93,6 @@ def _generated(request: GenerationRequest, task: Task, workers: Any) -> VDI:
     first = workers.map("first-pass", task.first_pass, order, order, values.values(), share=0.4)
     seen = workers.results(workers.map("seen", Seen.without_faces, order, first.values()))
     entering = task.light_entering(windows, seen)
-    ambient = None
-    if task.occlusion is not None:
-        parts = workers.map("opacities", attrgetter("opacities"), order, first.values())
-        ambient = workers.map("ambient", task.ambient, [()], *([part] for part in parts.values()))
-        ambient = ambient[()]
 
     # Make the lists of each block in which something may be seen
     visible = list(entering)
@@ -109,7 +104,6 @@ def _generated(request: GenerationRequest, task: Task, workers: Any) -> VDI:
         visible,
         [values[block] for block in visible],
         entering.values(),
-        [ambient] * len(visible),
         *([first.get(found.get(at)) for found in around] for at in blocks.offsets),
         share=0.4,
     )

@@ -175,8 +175,6 @@ def _do(task: Task, function: Callable[..., Any], at: tuple[int, ...], *argument
 
 def _named(task: Task, at: tuple[int, ...]) -> str:
     """Return what messages call a block, rows or the light."""
-    if not at:
-        return "the VDI's ambient occlusion"
     if len(at) < 3:
         return f"rows {at[0]} and following of the VDI"
     box = ", ".join(f"{part.start}:{part.stop}" for part in task.blocks.own((at[0], at[1], at[2])))

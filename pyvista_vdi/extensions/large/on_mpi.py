@@ -92,21 +92,19 @@ def generate_on_mpi(request: GenerationRequest, comm: Any) -> VDI | None:
 
     # The first rank sums up the light, neighbours send each other what they need
     light: dict[Indices, Any] = {}
-    ambient, summaries = None, comm.gather(seen.without_faces())
+    summaries = comm.gather(seen.without_faces())
     with together(comm, "the light"):
         if comm.rank == 0:
             of_blocks = {at: summaries[rank] for at, rank in ranks.items()}
             light = task.light_entering({at: task.window(at) for at in blocks}, of_blocks)
-            if task.occlusion is not None:
-                ambient = task.ambient(*(each.opacities for each in of_blocks.values()))
-    order, ambient = comm.bcast((list(light), ambient))
+    order = comm.bcast(list(light))
     entering = comm.scatter([light.get(places[r]) for r in range(comm.size)])
     sent: list[Any] = [None] * comm.size
     for offset in offsets:
         z, y, x = (k - along for k, along in zip(block, offset, strict=True))
         if (z, y, x) in ranks:  # to it, this block is the neighbour in that direction
             faces = {offset: seen.faces[offset]}
-            sent[ranks[z, y, x]] = seen._replace(faces=faces, depths=None, opacities=None)
+            sent[ranks[z, y, x]] = seen._replace(faces=faces, depths=None)
     received, others = comm.alltoall(sent), blocks.neighbours(block)
     around = [received[ranks[others[at]]] if at in others else None for at in offsets]
 
@@ -115,7 +113,7 @@ def generate_on_mpi(request: GenerationRequest, comm: Any) -> VDI | None:
     ranges = ranges_of(task.size[1], comm.size)
     with together(comm, "the second pass"):
         if entering is not None:
-            piece = task.second_pass(block, grid.array, entering, ambient, *around)
+            piece = task.second_pass(block, grid.array, entering, *around)
             pieces[: len(ranges)] = [piece.rows(y0, y1) for y0, y1 in ranges]
     pieces, rows, vdi = comm.alltoall(pieces), None, None
     with together(comm, "merging"):

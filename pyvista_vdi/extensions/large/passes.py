@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.device.constants import GROUP, RUN_WORDS, block_items
 from pyvista_vdi.device.devices import bytes_text
-from pyvista_vdi.errors import DeviceMemoryError
+from pyvista_vdi.errors import DeviceMemoryError, UnsupportedError
 from pyvista_vdi.extensions.large.blocks import (
     Blocks,
     Ends,
@@ -30,31 +30,21 @@ from pyvista_vdi.extensions.large.blocks import (
     ends_of,
     with_halo,
 )
-from pyvista_vdi.extensions.large.kernels import (
-    APPEND_RUNS,
-    COPY_RUNS,
-    OPTICAL_DEPTHS,
-)
 from pyvista_vdi.generation.list_arrays import GrowingLists
 from pyvista_vdi.generation.march import March, Records
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
-from pyvista_vdi.model.ambient_occlusion import OcclusionGrid
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import held_unit_distance
-from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, MediumOptions
+from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
 from pyvista_vdi.model.ray_forms import Rectangle, pixels_of_points
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.occlusion_grid import ambient_of_opacities
 from pyvista_vdi.volume.rays import GridRays, RayLaunch, checked_sample_distance
 
 #: Finished lists of whole rows: their lengths, fronts, backs, colours and optical depths.
 Rows = tuple[NDArray[Any], ...]
-Opacities = tuple[tuple[int, int, int], NDArray[np.float32]]
 
-#: Most bytes of the grid of ambient occlusion, which is not cut into blocks.
-_MOST_OCCLUSION = 2**31
 #: Light of which nothing is told apart any more, as an optical depth.
 _DARK = 80.0
 
@@ -70,9 +60,6 @@ class Seen(NamedTuple):
     #: Optical depth of each ray of the block's window, float16 (rows, columns); ``None`` where the
     #: block is transparent
     depths: NDArray[np.float16] | None = None
-    #: Where there is ambient occlusion: the first node along x, y and z, and what the block has of
-    #: the opacities of nodes from it on, float32 (nz, ny, nx); ``None`` where that is nothing
-    opacities: Opacities | None = None
 
     def without_faces(self) -> Seen:
         """Return what whoever sums up the light needs."""
@@ -110,21 +97,16 @@ class Task:
     options: GenerationOptions  # with the sample distance
     scalar_range: Ends
     rays: GridRays  # what is marched through, without values
-    occlusion: OcclusionGrid | None  # on which ambient occlusion is computed, if it is asked for
     device: Any  # what get_runtime takes, where a part is done
 
     @classmethod
     def of(cls, blocks: Blocks, request: GenerationRequest, scalar_range: Ends) -> Task:
         """Make defaults that follow from the whole grid explicit."""
         grid, options = blocks.grid, request.options
-        asked = options.ambient_occlusion
-        occlusion = None if asked is None else OcclusionGrid.of(grid, asked)
-        if asked and occlusion and occlusion.nbytes > _MOST_OCCLUSION:
-            gib, nodes = occlusion.nbytes / 2**30, " x ".join(map(str, occlusion.nodes))
-            raise DeviceMemoryError(
-                f"ambient occlusion with a radius of {asked.radius_in(grid)} needs {gib:.1f} GiB "
-                f"for a grid of {nodes} nodes, of {_MOST_OCCLUSION / 2**30:g} GiB at most: a "
-                "larger radius takes a coarser grid"
+        if options.ambient_occlusion is not None:
+            raise UnsupportedError(
+                "ambient occlusion needs the volume in one piece, and this one is in blocks: leave "
+                "ambient_occlusion out, or give a volume that is in memory"
             )
         step = checked_sample_distance(grid, options.sample_distance)
         unit = request.transfer_function.unit_distance or grid.default_unit_distance
@@ -137,7 +119,6 @@ class Task:
             GenerationOptions.of(options, {"sample_distance": step}),
             scalar_range,
             rays,
-            occlusion,
             request.device,
         )
 
@@ -154,8 +135,6 @@ class Task:
         A block in the window needs its neighbours' points; no others are read.
         """
         order = self.blocks.in_order(self.camera)
-        if self.occlusion is not None:  # what hides light from what is seen may be out of sight
-            return order
         wanted = {block for block, window in windows.items() if window.pixels}
         for block in [*wanted]:
             wanted.update(self.blocks.neighbours(block).values())
@@ -164,36 +143,14 @@ class Task:
     def first_pass(self, block: Indices, values: Values | Callable[[], Values]) -> Seen:
         """Find the optical depths of a block's rays, without its neighbours' points."""
         own = values() if callable(values) else values
-        faces, occlusion = self.blocks.faces(own), self.occlusion
+        faces = self.blocks.faces(own)
         ends = {at: ends_of(part) for at, part in {(0, 0, 0): own, **faces}.items()}
         seen, window = Seen(ends, faces), self.window(block)
-        if not (window.pixels or occlusion) or not self.may_be_visible(*ends[0, 0, 0]):
+        if not window.pixels or not self.may_be_visible(*ends[0, 0, 0]):
             return seen
         with self._medium(block, own, lit=False) as medium:
-            if occlusion is not None:
-                reach = (tuple(reversed(end)) for end in self.blocks.ends(block))
-                first, nodes = occlusion.nodes_around(*reach)
-                opacities = medium.part_opacities(occlusion, first, nodes)
-                if opacities.any():
-                    seen = seen._replace(opacities=(first, opacities))
-            if window.pixels:
-                depths = self._optical_depths(medium, window)
-                if depths.any():
-                    seen = seen._replace(depths=depths.astype(np.float16))
-        return seen
-
-    def ambient(self, *opacities: Opacities | None) -> NDArray[np.float32]:
-        """Return the mean transmittances around the occlusion's nodes, of all blocks' opacities.
-
-        The grid is as coarse as its radius: it is made in one piece.
-        """
-        grid = self.occlusion
-        assert grid is not None
-        of_all = np.zeros(grid.nodes[::-1], np.float32)
-        for (x, y, z), part in filter(None, opacities):
-            nz, ny, nx = part.shape
-            of_all[z : z + nz, y : y + ny, x : x + nx] += part
-        return ambient_of_opacities(get_runtime(self.device), grid, of_all)
+            depths = self._optical_depths(medium, window)
+        return seen._replace(depths=depths.astype(np.float16)) if depths.any() else seen
 
     def light_entering(
         self, windows: Windows, seen: Mapping[Indices, Seen]
@@ -224,20 +181,18 @@ class Task:
         block: Indices,
         values: Values | Callable[[], Values],
         light: NDArray[np.float16],
-        ambient: NDArray[np.float32] | None,
         *around: Seen | None,
     ) -> Piece:
         """Make the lists of a block's rays.
 
-        ``light``: that which enters it along each ray of its window, 0 to 1; ``ambient``: what
-        :meth:`ambient` returns, where there is occlusion; ``around``: the neighbours, in the order
-        of the blocks' offsets.
+        ``light``: that which enters it along each ray of its window, 0 to 1; ``around``: the
+        neighbours, in the order of the blocks' offsets.
         """
         given = zip(self.blocks.offsets, around, strict=True)
         parts = {at: seen.faces[at] for at, seen in given if seen is not None}
         own = with_halo(values() if callable(values) else values, parts)
         counts, runs, window = [], [], self.window(block)
-        with self._medium(block, own, ambient=ambient) as medium:
+        with self._medium(block, own) as medium:
             runtime, options = medium.runtime, self.options
             slices = Slices(runtime, window.size, options)
             with (
@@ -301,12 +256,7 @@ class Task:
 
     @contextmanager
     def _medium(
-        self,
-        block: Indices,
-        values: Values,
-        *,
-        lit: bool = True,
-        ambient: NDArray[np.float32] | None = None,
+        self, block: Indices, values: Values, *, lit: bool = True
     ) -> Iterator[DeviceVolume]:
         """Bring a block to a device: with its neighbours' points, if it is ``lit``."""
         grid, runtime, limit = self.blocks.grid, get_runtime(self.device), self.options.memory_limit
@@ -328,9 +278,8 @@ class Task:
                 runtime,
                 Volume(values, grid.spacing, grid.origin, grid.direction, name="block"),
                 self.transfer_function,
-                MediumOptions.of(self.options, {} if lit else {"ambient_occlusion": None}),
+                self.options,
                 part=self.blocks.part(block, before, self.scalar_range),
-                ambient=ambient,
             )
         finally:
             runtime.finish()  # the values may be host memory in use
@@ -347,7 +296,8 @@ class Task:
         ):
             launch = RayLaunch(
                 runtime,
-                OPTICAL_DEPTHS,
+                "large/optical_depths.cl",
+                "optical_depths",
                 variant.defines,
                 one_by_one=variant.one_by_one,
                 **medium.medium_arguments(self.camera),
@@ -378,7 +328,9 @@ def _downloaded(records: Records, part: Slice) -> tuple[NDArray[np.uint16], NDAr
         runtime.upload(begins, "places of runs") as places,
         runtime.buffer((max(made, 1), RUN_WORDS), name="runs") as runs,
     ):
-        launch = runtime.bind(COPY_RUNS, records.defines, records=records.runs, runs=runs)
+        launch = runtime.bind(
+            "large/runs.cl", "copy_runs", records.defines, records=records.runs, runs=runs
+        )
         launch(
             records.items,
             GROUP,
@@ -399,7 +351,9 @@ def _append(records: Records, piece: Piece) -> None:
         runtime.upload(begins, "places of runs") as places,
         runtime.upload(np.ascontiguousarray(piece.runs), "runs") as runs,
     ):
-        launch = runtime.bind(APPEND_RUNS, records.defines, records=records.runs, runs=runs)
+        launch = runtime.bind(
+            "large/runs.cl", "append_runs", records.defines, records=records.runs, runs=runs
+        )
         launch(
             records.items,
             GROUP,

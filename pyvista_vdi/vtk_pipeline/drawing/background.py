@@ -108,7 +108,7 @@ class Background:
     def estimate(
         self, by: Estimator, number: int, vdi: VDI, request: Request, view: View, shown: Any
     ) -> None:
-        """Estimate the error of a VDI in a view."""
+        """ViewEstimate the error of a VDI in a view."""
 
         def judge(runtime: Runtime, _: Callable[[float], None]) -> ViewEstimate:
             with runtime.aside():  # loads SciPy, the first time: a quarter of a second

@@ -8,7 +8,7 @@ import numpy as np
 
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.vtk_pipeline.drawing.screen import fill_viewport
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm, HeldByVTK, watch
+from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkStreamingDemandDrivenPipeline
@@ -45,7 +45,6 @@ class Box(Algorithm):
         self.components = 1
         self._stands = False
         self._far: tuple[Any, Any] | None = None  # origin and spacing, in a frame of what is far
-        self._watched: tuple[HeldByVTK, int] | None = None
         self.Update()
         self.image = self.GetOutputDataObject(0)
 
@@ -65,24 +64,7 @@ class Box(Algorithm):
 
     def connect(self) -> None:
         """Follow what the input is made of, which may be something else by now."""
-        port = None if self._shown is None else self._shown.port
-        if self._watched is not None:
-            self._watched[0].get().RemoveObserver(self._watched[1])
-        self._watched = None
-        if port is not None:
-            producer = port.GetProducer()
-            self._watched = HeldByVTK(producer), watch(producer, self, Box._executed, "EndEvent")
-        self.SetInputConnection(port)
-        self._executed()  # what fails from the first has no bounds either
-
-    def _executed(self) -> None:
-        """Clear the bounds where what is before gives nothing, as if it fails."""
-        connected = self.GetNumberOfInputConnections(0) > 0
-        data = self.GetInputDataObject(0, 0) if connected else None
-        if not self._stands and (
-            data is None or data.GetNumberOfElements(vtkDataObject.POINT) == 0
-        ):
-            self.place(None)
+        self.SetInputConnection(None if self._shown is None else self._shown.port)
 
     def give_components(self, components: int) -> None:
         """Set the voxels' components: VTK asks for four where they are dependent."""

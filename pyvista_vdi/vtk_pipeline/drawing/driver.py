@@ -255,7 +255,7 @@ class Driver(Planner):
 
     def follow(self, window: Any) -> None:
         """Start the event loop's timer, if something goes on and no hand moves."""
-        if self.goes_on and not Window.of(window).moving(self.settings):
+        if self.goes_on and not Window.of(window).moving:
             period = PERIOD if self.input is None else self.input.period or PERIOD
             self._timer.start(window.GetInteractor(), period)
 
@@ -269,8 +269,9 @@ class Driver(Planner):
             self.begin_at_rest(window)
         if not self.goes_on:
             self._timer.stop()
-        if swapped:
-            window.render()
+        renderer = self.renderer()
+        if swapped and renderer is not None:
+            renderer.GetRenderWindow().GetInteractor().Render()
 
     # Errors in a frame
 

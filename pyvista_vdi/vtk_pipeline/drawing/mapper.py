@@ -164,12 +164,10 @@ class VDIMapperMethods:
         theirs: Any = other
         shown = other.driver.input
         self.driver.set_input(None if shown is None else shown.shared())
-        self.SetDevice(theirs.GetDevice())
         self.driver.set(**vars(other.driver.settings))
-        self.SetMaximumImageSampleDistance(theirs.GetMaximumImageSampleDistance())
-        self.SetCropping(theirs.GetCropping())
-        self.SetCroppingRegionPlanes(theirs.GetCroppingRegionPlanes())
-        self.SetCroppingRegionFlags(theirs.GetCroppingRegionFlags())
+        cropping = ("Cropping", "CroppingRegionPlanes", "CroppingRegionFlags")
+        for name in ("Device", "MaximumImageSampleDistance", *cropping):
+            getattr(self, f"Set{name}")(getattr(theirs, f"Get{name}")())
         planes = theirs.GetClippingPlanes()
         self.RemoveAllClippingPlanes()
         for i in range(0 if planes is None else planes.GetNumberOfItems()):

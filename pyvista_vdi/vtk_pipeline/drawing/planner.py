@@ -216,7 +216,7 @@ class Planner:
         if window.whole_picture:
             self._number = number
         # A view is at rest in its second frame, and when nothing has moved for a moment
-        time, moving = now(), window.moving(settings)
+        time, moving = now(), window.moving
         if view != self.view:
             self._moved_at = time
         elif not moving and first:
@@ -440,7 +440,7 @@ class Planner:
         source, seen = self.input, self.seen
         if not isinstance(source, SourceInput) or seen is None or source.stamp() != self._stamp:
             return  # what has changed is for a frame to look at
-        still, moving = now() - self._moved_at >= SETTLED, window.moving(self.settings)
+        still, moving = now() - self._moved_at >= SETTLED, window.moving
         self.seen = seen = replace(
             seen,
             hand=moving and not still,

@@ -35,7 +35,6 @@ class MapperSettings:
     picking_opacity: float = 0.05  # as in VTK's pickers for volumes
     adjust: bool = True
     adjust_multi_samples: bool = True
-    update_rate: float = 1.0  # as vtkSmartVolumeMapper
     target: float | None = None
     off_screen: bool = False
 
@@ -106,20 +105,13 @@ _METHODS = {
     "adjust": _Method(
         "AutoAdjustSampleDistances",
         "whether previews of fewer pixels are drawn while the view moves",
-        "That is where the window's desired update rate is at least "
-        "``GetInteractiveUpdateRate()``. Frames at rest, screenshots, exports and off-screen "
-        "windows are always full.",
+        "That is where the window's desired update rate is at least 1 per second. Frames at rest, "
+        "screenshots, exports and off-screen windows are always full.",
     ),
     "adjust_multi_samples": _Method(
         "AutoAdjustMultiSamples",
         "whether previews go without multisampling where that makes them late",
         "All VDIs in a window must allow it; ``GetMultiSamples()`` stays as it was set.",
-    ),
-    "update_rate": _Method(
-        "InteractiveUpdateRate",
-        "the window's desired update rate from which on a frame is interactive, 1/s",
-        "",
-        lambda rate: checked_rate("the interactive update rate", rate),
     ),
     "target": _Method(
         "TargetFrameRate",

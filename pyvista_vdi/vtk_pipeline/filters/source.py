@@ -19,7 +19,7 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float, as_range, not_taken, one_of
+from pyvista_vdi.model.checks import as_range, one_of
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import (
@@ -98,16 +98,6 @@ class Request:
         )
 
 
-def checked_options(options: GenerationOptions) -> GenerationOptions:
-    """Return options whose steps are of a length that there can be."""
-    distance = options.sample_distance
-    if distance is not None and not 0 < as_float(distance) < np.inf:
-        raise not_taken(distance)(
-            f"sample_distance must be a positive length in model units; got {distance!r}"
-        )
-    return options
-
-
 def checked_size(*size: Any) -> tuple[int, int] | None:
     """Return a window's size, given as two numbers or as a pair; ``None`` as it is."""
     return None if size == (None,) else check_window_size(size[0] if len(size) == 1 else size)
@@ -163,7 +153,6 @@ class VDISource(OptionMethods, Classifying):
         "options",
         "how the VDI is made, all of it at once; lights are set by ``SetLights``",
         GenerationOptions(),
-        checked_options,
     )
     SetDial, GetDial = accessors(
         "target",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +27,8 @@ from pyvista_vdi.vtk_pipeline.vtk import (
 #: Cameras remembered per window; more than any scene has viewports that are turned in turn.
 _KNOWN_CAMERAS = 16
 
+#: A window's desired update rate from which on a hand moves, 1/s, as for vtkSmartVolumeMapper.
+_INTERACTIVE = 1.0
 #: Frames per second to be kept in a window that nobody's hand moves.
 _RATE = 30.0
 
@@ -46,17 +48,6 @@ class ShownVolume(NamedTuple):
     mapper: Any
     driver: Any  # of a VDI; None behind a volume of VTK's
     assemblies: tuple[Any, ...]  # that it is a part of, the outermost first
-    behind: tuple[Any, ...]  # all of VTK's that may be of Python's classes
-
-    @classmethod
-    def of(cls, prop: Any, assemblies: tuple[Any, ...] = ()) -> ShownVolume:
-        """Return a volume with what it has now."""
-        mapper = prop.GetMapper()
-        driver = getattr(mapper, "driver", None)
-        own = driver if driver is not None and driver.actor is prop else None
-        data = None if own is None else mapper.GetDataSetInput()
-        behind = (mapper, prop.GetShaderProperty(), prop.GetProperty(), data)
-        return cls(prop, mapper, own, assemblies, behind)
 
     @property
     def visible(self) -> bool:
@@ -73,39 +64,18 @@ class ShownVolume(NamedTuple):
         return as_array(placed)
 
 
-class _ShownVolumes:
-    """The volumes of a renderer, those in assemblies too; see :meth:`Window.shown_in`."""
-
-    def __init__(self, renderer: Any) -> None:
-        self.renderer = weakly(renderer)
-        self._volumes: list[ShownVolume] = []
-        self._lists: list[tuple[Any, int]] = []  # of props, and when they were modified
-
-    def now(self) -> list[ShownVolume]:
-        """Return them as the lists of props are now."""
-        if not self._lists or any(props.GetMTime() != at for props, at in self._lists):
-            self._lists, self._volumes, renderer = [], [], self.renderer()
-            if renderer is not None:
-                self._look(renderer.GetViewProps(), ())
-        return self._volumes
-
-    def check(self) -> None:
-        """Look again, between frames, where a volume has another mapper, property or data."""
-        for each in self._volumes:
-            behind = ShownVolume.of(each.actor).behind
-            if any(a is not b for a, b in zip(behind, each.behind, strict=True)):
-                self._lists = []
-
-    def _look(self, props: Any, assemblies: tuple[Any, ...]) -> None:
-        self._lists.append((props, props.GetMTime()))
-        for i in range(props.GetNumberOfItems()):
-            prop = props.GetItemAsObject(i)
-            if hasattr(prop, "GetParts"):
-                # Not vtkRenderer.GetVolumes: an assembly that is asked for its volumes while it
-                # draws its parts loses its place among them
-                self._look(prop.GetParts(), (*assemblies, prop))
-            elif isinstance(prop, vtkVolume):
-                self._volumes.append(ShownVolume.of(prop, assemblies))
+def _volumes_of(props: Any, assemblies: tuple[Any, ...] = ()) -> Iterator[ShownVolume]:
+    for i in range(props.GetNumberOfItems()):
+        prop = props.GetItemAsObject(i)
+        if hasattr(prop, "GetParts"):
+            # Not vtkRenderer.GetVolumes: an assembly that is asked for its volumes while it draws
+            # its parts loses its place among them
+            yield from _volumes_of(prop.GetParts(), (*assemblies, prop))
+        elif isinstance(prop, vtkVolume):
+            mapper = prop.GetMapper()
+            driver = getattr(mapper, "driver", None)
+            own = driver if driver is not None and driver.actor is prop else None
+            yield ShownVolume(prop, mapper, own, assemblies)
 
 
 class Window:
@@ -126,7 +96,7 @@ class Window:
         self.pace = Pace()
         self.of_frame: dict[Any, Any] = {}
         self._window = weakly(window)
-        self._shown: dict[str, _ShownVolumes] = {}  # by each renderer that has drawn a VDI
+        self._renderers: list[Callable[[], Any]] = []  # that have drawn a VDI
         self._known: list[Callable[[], Any]] = []
         self._given_up: int | None = None  # the window's multisampling, in a frame without it
         self._blit: Any = None  # how the window shows its frames, in one that goes another way
@@ -151,31 +121,33 @@ class Window:
         return found
 
     def shown_in(self, renderer: Any) -> list[ShownVolume]:
-        """Return the volumes that a renderer of this window shows, in its order.
+        """Return the volumes that a renderer of this window shows, in its order."""
+        key = ("shown", renderer.GetAddressAsString(""))
+        if key not in self.of_frame or not self.drawing:
+            if not any(known() is renderer for known in self._renderers):
+                self._renderers.append(weakly(renderer))
+                weak = weakref.ref(self)
 
-        They are held, with the objects that Python has of them and of what is behind them, until a
-        list of props changes, or that. VTK holds no more than its own part of them: where Python
-        has let go of an object of its own classes, each look would make another one.
-        """
-        address = renderer.GetAddressAsString("")
-        known = self._shown.get(address)
-        if known is None or known.renderer() is not renderer:
-            weak = weakref.ref(self)
+                def camera_changed(*_: Any) -> None:
+                    window = weak()
+                    if window is not None:
+                        window._camera_changed()
 
-            def camera_changed(*_: Any) -> None:
-                window = weak()
-                if window is not None:
-                    window._camera_changed()
+                renderer.AddObserver("ActiveCameraEvent", camera_changed)
+            self.of_frame[key] = list(_volumes_of(renderer.GetViewProps()))
+        return self.of_frame[key]  # type: ignore[no-any-return]
 
-            renderer.AddObserver("ActiveCameraEvent", camera_changed)
-            known = self._shown[address] = _ShownVolumes(renderer)
-        return known.now()
+    @property
+    def shown(self) -> list[tuple[Any, ShownVolume]]:
+        """The VDIs of this window, each with the renderer that shows it."""
+        window, there = self._window(), [known() for known in self._renderers]
+        there = [each for each in there if each is not None and window.HasRenderer(each)]
+        return [(r, v) for r in there for v in self.shown_in(r) if v.driver is not None]
 
     @property
     def drivers(self) -> list[Any]:
         """Those of all VDIs in this window."""
-        shown = [each.driver for volumes in self._shown.values() for each in volumes.now()]
-        return [each for each in dict.fromkeys(shown) if each is not None]
+        return list(dict.fromkeys(each.driver for _, each in self.shown))
 
     @property
     def drawing(self) -> bool:
@@ -183,13 +155,6 @@ class Window:
         return self._started is not None
 
     # What is seen of it
-
-    def render(self) -> None:
-        """Draw the window, as from its event loop."""
-        window = self._window()
-        interactor = None if window is None else window.GetInteractor()
-        if interactor is not None:
-            interactor.Render()
 
     def watched_behind(self, settings: Any) -> bool:
         """Whether work may go on behind the frames: somebody watches, and can move."""
@@ -199,18 +164,19 @@ class Window:
 
     def rate(self, settings: Any) -> float:
         """Return the frames per second to be kept while a hand moves, also before it does."""
-        if settings.target or self.moving(settings):
+        if settings.target or self.moving:
             return float(settings.target or self._window().GetDesiredUpdateRate())
         interactor = self._window().GetInteractor()
         return _RATE if interactor is None else max(1.0, interactor.GetDesiredUpdateRate())
 
-    def moving(self, settings: Any) -> bool:
+    @property
+    def moving(self) -> bool:
         """Whether a hand moves, by VTK's convention."""
-        return bool(self._window().GetDesiredUpdateRate() >= settings.update_rate)
+        return bool(self._window().GetDesiredUpdateRate() >= _INTERACTIVE)
 
     def previews(self, settings: Any) -> bool:
         """Whether frames may have fewer rays now: a hand moves, and somebody watches."""
-        if not (settings.previews and self.moving(settings)):
+        if not (settings.previews and self.moving):
             return False
         return bool(self._window().GetShowWindow()) or settings.off_screen
 
@@ -250,11 +216,6 @@ class Window:
         self.number += 1
         # Between two frames only: no frame shows two generations, nor does a picture in tiles
         window = self._window()
-        for address, shown in list(self._shown.items()):
-            if window.HasRenderer(shown.renderer()):
-                shown.check()
-            else:
-                del self._shown[address]
         drivers = self.drivers
         if self.whole_picture:
             for driver in drivers:
@@ -275,12 +236,7 @@ class Window:
 
     def _may_go_without(self) -> bool:
         """Whether a frame may go without multisampling: all VDIs of the window let previews do."""
-        shown = [
-            (each.driver.settings, volumes.renderer())
-            for volumes in self._shown.values()
-            for each in volumes.now()
-            if each.driver is not None and each.visible
-        ]
+        shown = [(each.driver.settings, r) for r, each in self.shown if each.visible]
         cameras = [known() for known in self._known]
         return bool(shown) and all(
             settings.adjust_multi_samples
@@ -299,12 +255,11 @@ class Window:
         if blit is not None and window.GetFrameBlitMode() == window.BlitToCurrent:
             window.SetFrameBlitMode(blit)
         self._foreground.close()
-        self.of_frame.clear()
         started, self._started = self._started, None
         self._previewed = self.pace.frame.preview or given_up is not None
         seconds = None if started is None else now() - started
-        moving = any(self.moving(driver.settings) for driver in self.drivers)
-        self.pace.ended(seconds, moving)
+        self.pace.ended(seconds, self.moving)
+        self.of_frame.clear()
 
     def _camera_changed(self) -> None:
         """Replace a preview on the screen by the full frame before a screenshot reads it.

@@ -51,7 +51,7 @@ def test_four_ranks_make_the_vdi_of_the_same_blocks_and_all_say_what_fails(
     function = transfer_for(volume, "linear", gradient_opacities=[0.2, 1], gradient_range=(0, 30))
     camera = VIEWS["all of it"](volume)
     arguments = (volume, camera, WINDOW, function)
-    options = {"max_supersegments": 8, "ambient_occlusion": 8.0, "device": default_runtime}
+    options = {"max_supersegments": 8, "device": default_runtime}
     # Before, so that not each rank compiles the kernels
     expected = generate_in_blocks(*arguments, chunks=(24, 41, 27), **options)
     run(4, PROGRAM, "failing,same", tmp_path)

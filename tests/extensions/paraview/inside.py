@@ -153,25 +153,6 @@ def volume(folder):
     simple.SaveScreenshot(str(folder / "vdi.png"), flat, ImageResolution=SIZE)
 
 
-def deferred(folder):
-    """Edit the colours and opacities of a file's values."""
-    asked = json.loads((folder / "asked.json").read_text())
-    reader = simple.OpenDataFile(str(folder / "kept.vdi"))
-    simple.SaveData(str(folder / "again.vdi"), reader)
-    picture = simple.VDIToImage(Input=reader)
-    picture.UpdatePipeline()
-    # What the colour map editor edits
-    table, opacity = simple.GetColorTransferFunction("v"), simple.GetOpacityTransferFunction("v")
-    found = {"range": [table.RGBPoints[0], table.RGBPoints[-4]]}
-    table.ColorSpace = "RGB"
-
-    for i, look in enumerate(asked["looks"]):
-        table.RGBPoints, opacity.Points = look
-        picture.UpdatePipeline()
-        save_pixels(picture, folder / f"file_{i}.npy")
-    (folder / "found.json").write_text(json.dumps(found))
-
-
 def mistakes(folder):
     """Do what cannot be done; ParaView says why, and goes on."""
     source = simple.VDISource(Input=simple.Wavelet())

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from plugin_scenes import soft_ball
 from virtual_screen import virtual_screen
 
 import pyvista_vdi as pvdi
@@ -39,9 +38,6 @@ REQUIRED = os.environ.get("PYVISTA_VDI_REQUIRE_PARAVIEW") == "1"
 #: side of a border is another one; 0.1 % of the pixels may be.
 ROUNDING = 1e-5
 SHARE_OF_BORDER_PIXELS = 1e-3
-
-#: Of the views in which series are shown.
-SCREEN = (240, 180)
 
 #: An opacity and a colour in eight bits each, their product in eight bits: 1.5 / 255 at most.
 BLENDED = 2 / 255
@@ -196,31 +192,6 @@ def test_vdi_looks_like_paraviews_own_volume(paraview, tmp_path):
     assert judge.max() > 0.5
     # 0.9994 measured; steps of the mapper are its own choice
     assert compare_images(judge, found).ssim > 0.998
-
-
-def test_colour_map_editor_acts_on_values(paraview, tmp_path, default_runtime):
-    """Of a file, as a picture."""
-    looks = [([[0, 0.2, 1], [1, 0.5, 0]], [0.0, 0.8]), ([[1, 1, 1], [0.9, 0, 0.3]], [0.0, 0.3])]
-    low, high = 30.0, 220.0
-    ball, camera = soft_ball(12), filling_camera((-1, 1, -1, 1, -1, 1), SCREEN)
-    kept = pvdi.generate(
-        ball, camera, SCREEN, classification="deferred", value_range=(low, high), scalars="v"
-    )
-    kept.save(tmp_path / "kept.vdi")
-    asked = {"looks": []}
-    for colors, (first, last) in looks:
-        points = [low, *colors[0], high, *colors[1]], [low, first, 0.5, 0, high, last, 0.5, 0]
-        asked["looks"].append(points)
-    (tmp_path / "asked.json").write_text(json.dumps(asked))
-    assert paraview("deferred", tmp_path).strip() == ""
-
-    found = json.loads((tmp_path / "found.json").read_text())
-    assert found == {"range": [low, high]}
-    assert pvdi.read(tmp_path / "again.vdi").equals(kept)
-    for i, (colors, opacities) in enumerate(looks):
-        table = pvdi.TransferFunction(colors, opacities, (low, high))
-        front = pvdi.render(kept, camera, SCREEN, transfer_function=table)
-        assert_pixels_alike(pixels(tmp_path / f"file_{i}.npy", SCREEN), front)
 
 
 def test_mistakes_are_said_and_nothing_breaks(paraview, tmp_path):

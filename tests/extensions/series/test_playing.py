@@ -76,15 +76,15 @@ def test_a_damaged_step_of_a_file_leaves_what_was_shown(plotter, series, tmp_pat
     np.testing.assert_array_equal(frame(plotter), picture_of(series[3], plotter))
 
 
-def test_another_series_keeps_the_time_and_copies_play_by_themselves(plotter, series):
+def test_another_series_begins_anew_and_copies_play_by_themselves(plotter, series):
     actor = shown(plotter, series)
     actor.time = 0.5
     other = actor.copy()
     assert other.step == 2
     other.step = 0
     assert actor.step == 2
-    actor.series = series[1:]
-    assert (actor.time, actor.step) == (0.5, 1)
+    actor.vdi = series[1:]
+    assert (actor.series, actor.step) == (series[1:], 0)
     actor.vdi = series[0]
     assert actor.series is None
     assert not actor.playing
@@ -97,7 +97,6 @@ def test_what_has_no_times_is_refused(plotter, series):
             use()
     one = plotter.add_vdi(series[:1], show_scalar_bar=False)
     for use, error, message in (
-        (lambda: setattr(actor, "series", [1, 2]), InvalidArgumentError, "VDISeries"),
         (lambda: plotter.add_vdi(series, cmap="bone"), UnsupportedError, "cmap cannot be given"),
         (lambda: actor.mapper.SetVDI([series]), InvalidVDIError, "list"),
         (one.regenerate, InvalidArgumentError, "without a volume"),

@@ -131,12 +131,7 @@ HOSTILE = {
     "format": ("x",),
     "depth_origin": (None,),
 }
-NO_CAMERAS = (
-    {"view_angle": 180},
-    {"position": [None, 0, 0]},
-    {"model_transform": [[1]]},
-    {"parallel_scale": "x"},
-)
+NO_CAMERAS = ({"view_angle": 180}, {"position": [None, 0, 0]}, {"model_transform": [[1]]})
 
 
 def test_hostile_headers_and_other_compressions():

@@ -3,7 +3,6 @@
 javascript/player.test.js has which is shown when, and what is said of wrong ones.
 """
 
-import io
 import zipfile
 
 import numpy as np
@@ -72,15 +71,6 @@ def shown_from(open_page, path, content=None):
     return open_page(SIZE, attributes=f'src="{path.name}"', files=files)
 
 
-def with_another(path, name, content):
-    """The bytes of a ZIP with another content in place of a file's."""
-    stream = io.BytesIO()
-    with zipfile.ZipFile(path) as archive, zipfile.ZipFile(stream, "w") as changed:
-        for each in archive.namelist():
-            changed.writestr(each, content if each == name else archive.read(each))
-    return stream.getvalue()
-
-
 # -- series ----------------------------------------------------------------------------------------
 
 
@@ -122,19 +112,6 @@ def test_it_plays_by_slider_button_and_keys(series, path, open_page):
         page.evaluate("() => { viewer.time = 'x'; }")
 
 
-def test_a_damaged_step_is_named_and_the_next_is_shown(series, path, open_page):
-    page = shown_from(open_page, path, with_another(path, "000003.vdi", b"broken" * 9))
-    page.wait_for("viewer.series?.complete")
-    page.evaluate("(time) => { viewer.time = time; }", series.times[3])
-    why = page.evaluate("viewer.ready.catch(({ message }) => message)")
-    assert "step 3 cannot be shown: this is no VDI file" in why
-    alert = page.page.locator("vdi-viewer p")
-    assert why in alert.inner_text()
-    page.evaluate("viewer.time = 0")
-    page.ready()
-    assert not alert.is_visible()
-
-
 def test_the_first_step_is_shown_while_the_rest_comes(series, path, open_page):
     data = path.read_bytes()
     with zipfile.ZipFile(path) as archive:
@@ -161,9 +138,7 @@ def test_the_first_step_is_shown_while_the_rest_comes(series, path, open_page):
     assert page.page.get_by_label("Time", exact=True).get_attribute("max") == str(N - 1)
 
 
-def test_a_page_plays_from_disk_and_is_read_and_converted_as_files_are(
-    series, open_page, tmp_path, capsys
-):
+def test_a_page_plays_from_disk_and_is_read_and_converted_as_files_are(series, open_page, tmp_path):
     """It stands still for who asks for less motion, also in the midst of it."""
     path = series.save(tmp_path / "a ball.html", autoplay=True, background=(0.1, 0.2, 0.3))
     page = open_page(url=path.as_uri(), viewport={"width": 160, "height": 90})
@@ -174,8 +149,6 @@ def test_a_page_plays_from_disk_and_is_read_and_converted_as_files_are(
     page.evaluate("viewer.time = 4")
     page.assert_shows(series[8], SIZE, series.camera)
 
-    assert main(["info", str(path)]) == 0
-    assert "9, times 0 to 4" in capsys.readouterr().out
     again = tmp_path / "b.vdis"
     assert main(["convert", str(path), "-o", str(again)]) == 0
     assert all(a.equals(b) for a, b in zip(pvdi.read(again), series, strict=True))

@@ -7,7 +7,6 @@ from browsers import picture
 from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.extensions.sets.generate import orbit, spread
 from pyvista_vdi.model.standard_cases import filling_camera
 
 pytestmark = pytest.mark.gl
@@ -55,13 +54,6 @@ def series(default_runtime):
     return pvdi.generate_series([ball(k) for k in range(N)], camera, SIZE, range(N), **LOOKS)
 
 
-@pytest.fixture(scope="module")
-def vdi_set(default_runtime):
-    volume = soft_ball(16)
-    views = orbit(filling_camera(volume.bounds, SIZE), volume.bounds, spread(6, (0, 0, 1), 180))
-    return pvdi.VDISet([pvdi.generate(volume, view, SIZE, **LOOKS) for view in views])
-
-
 def look_from(plotter, view):
     plotter.camera.position, plotter.camera.focal_point = view.position, view.focal_point
     plotter.camera.up, plotter.camera.view_angle = view.view_up, view.view_angle
@@ -96,27 +88,6 @@ def test_a_series_is_whole_in_the_page_and_plays(plotter, from_disk, series, tmp
     again = pvdi.read(tmp_path / "scene.html")
     assert isinstance(again, pvdi.VDISeries)
     assert again.times == series.times
-
-
-def test_of_a_set_the_page_draws_the_nearest(plotter, from_disk, vdi_set, tmp_path):
-    vdi_set.blend = 0
-    actor = plotter.add_vdi(vdi_set, show_scalar_bar=False)
-    look_from(plotter, vdi_set.cameras[0])
-    page = from_disk(plotter)
-    page.ready()
-    for view in vdi_set.cameras[1:3]:
-        page.evaluate(
-            "(camera) => { viewer.camera = {...viewer.camera, ...camera}; "
-            "return viewer.ready.then(() => 0) }",
-            {name: getattr(view, name) for name in ("position", "focal_point", "view_up")},
-        )
-        look_from(plotter, view)
-        assert_as_plotter(page, plotter)
-        nearest = actor.vdi_set.nearest(plotter.camera)
-        assert page.evaluate("viewer.set") == {"length": len(vdi_set), "nearest": nearest}
-    again = pvdi.read(tmp_path / "scene.html")
-    assert isinstance(again, pvdi.VDISet)
-    assert len(again) == len(vdi_set)
 
 
 def test_subplots_are_refused(tmp_path):

@@ -335,37 +335,30 @@ def test_viewers_share_one_context_and_make_up_for_a_lost_one(vdi, around):
 
 
 @pytest.mark.slow
-def test_memory_stays_flat_over_frames_and_swaps(vdi, data, open_page):
+def test_memory_stays_flat_over_frames_and_swaps(data, open_page):
     """Ten thousand frames, and two hundred other VDIs."""
     page = open_page((64, 36), before=COUNTING)
     page.load(data)
-    page.evaluate(
-        f"""() => {{
-          const bytes = bytesOf({in_base64(data)!r});
-          window.use = async (frames, swaps) => {{
-            for (let k = 0; k < frames; ++k) {{
-              const angle = k / 50, {{ position: [x, y, z], ...rest }} = viewer.camera;
-              const drawn = new Promise((resolve) =>
-                viewer.addEventListener("framedrawn", resolve, {{ once: true }}));
-              viewer.camera = {{ ...rest, position: [x + 1e-4 * Math.cos(angle), y, z] }};
-              await drawn;
-              if (k % Math.ceil(frames / swaps) === 0) await viewer.load(bytes.slice());
-            }}
-          }};
-        }}"""
-    )
-    page.evaluate("use(500, 20)")
+    use = """async ([text, frames, swaps]) => {
+      const bytes = bytesOf(text);
+      for (let k = 0; k < frames; ++k) {
+        const { position: [x, y, z], ...rest } = viewer.camera;
+        const drawn = new Promise((resolve) =>
+          viewer.addEventListener("framedrawn", resolve, { once: true }));
+        viewer.camera = { ...rest, position: [x + 1e-4 * Math.cos(k / 50), y, z] };
+        await drawn;
+        if (k % Math.ceil(frames / swaps) === 0) await viewer.load(bytes.slice());
+      }
+      heard.length = 0;  // of this page, not of the viewer
+      return JSON.stringify(alive);
+    }"""
     session = page.page.context.new_cdp_session(page.page)
-
-    def used():
-        page.evaluate("heard.length = 0")  # of this page, not of the viewer
+    found = []
+    for frames, swaps in ((500, 20), (10000, 200)):
+        alive = page.evaluate(use, [in_base64(data), frames, swaps])
         session.send("HeapProfiler.collectGarbage")
-        heap = session.send("Runtime.getHeapUsage")["usedSize"]
-        return page.evaluate("JSON.stringify(alive)"), heap
-
-    alive, heap = used()
-    page.evaluate("use(10000, 200)")
-    again, later = used()
+        found.append((alive, session.send("Runtime.getHeapUsage")["usedSize"]))
+    (alive, heap), (again, later) = found
     assert again == alive
     assert later < heap + 2e6  # a viewer's own objects take some 1e5
 
