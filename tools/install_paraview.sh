@@ -108,7 +108,7 @@ repair_plugin_loader() {
 
 check_plugin() (
     eval "$("$folder/bin/pyvista-vdi" paraview --environment)"
-    "$pvpython" -c 'from paraview.simple import VDISource' || fail "$folder: ParaView has no VDISource"
+    "$pvpython" -c 'from paraview.simple import VDISource' || fail "ParaView does not load it"
 )
 
 say_how() {
