@@ -20,16 +20,10 @@ typedef struct {
 
 #if LANES == 16
 // Words of 64 bits come by one load each, as gathers are slow where these kernels run: as doubles,
-// where there are any, they take an instruction less.
-#ifdef cl_khr_fp64
+// which CPUs have, they take an instruction less.
 typedef double Word;
 typedef double8 Words8;
 #define AS_WORD as_double
-#else
-typedef ulong Word;
-typedef ulong8 Words8;
-#define AS_WORD as_ulong
-#endif
 
 // They are loaded in an order from which two shuffles within 128 bits make the halves of all.
 inline Words halves_of(Words8 first, Words8 second)

@@ -1,7 +1,6 @@
 """A device ready for work, and launches of kernels: arguments by name, in pieces behind frames."""
 
 import math
-import operator
 import threading
 import time
 from collections.abc import Mapping
@@ -90,9 +89,9 @@ class Launch:
         of a work-group, which divide them (see :func:`padded`); arguments are as of
         :meth:`Runtime.bind`.
 
-        Raises InvalidArgumentError or TypeError if the sizes do not fit each other or the arguments
-        not the kernel's, DeviceMemoryError or DeviceError if the driver refuses or a buffer has
-        been released.
+        Raises InvalidArgumentError or TypeError if the arguments are not the kernel's,
+        DeviceMemoryError or DeviceError if the driver refuses, sizes that do not fit each other for
+        one, or a buffer has been released.
         """
         # Set what changes
         device, kernel = self._device, self._kernel
@@ -105,18 +104,11 @@ class Launch:
         for buffer in self._buffers.values():
             buffer.used()
 
-        # Check the sizes
+        # Enqueue it
         whole = tuple(map(int, size)) if isinstance(size, tuple) else (int(size),)
         local = group if isinstance(group, tuple) else (group,)
-        if len(local) != len(whole) or any(map(operator.mod, whole, local)):
-            raise InvalidArgumentError(
-                f"kernel {kernel.name!r}: the global size {whole} is no multiple of the "
-                f"work-group size {local} in every dimension; round it up with padded()"
-            )
         if 0 in whole:
             return
-
-        # Enqueue it
         worker = device.thread.worker
         try:
             if worker is not None:

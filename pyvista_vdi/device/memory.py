@@ -320,7 +320,8 @@ class Memory(Turns):
             self.allocated, held.nbytes = self.allocated - held.nbytes, 0
         try:
             if held.in_place and not devices.forked:  # the array may go when the buffer has gone
-                self.finish()
+                with contextlib.suppress(DeviceError):  # a device that is lost uses it no more
+                    self.finish()
         finally:
             if held.memory is not None:
                 held.memory.release()

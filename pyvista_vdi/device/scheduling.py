@@ -43,15 +43,14 @@ class Worker:
     """A thread inside :meth:`Turns.background`.
 
     ``cancelled`` says whether the work is no longer wanted, ``paused`` whether it is to wait;
-    ``turn_began`` when its turn began, by ``time.perf_counter``, and ``worked`` how long its turns
-    before took, seconds.
+    ``turn_began`` when its turn began, by ``time.perf_counter``.
     """
 
     def __init__(
         self, cancelled: Callable[[], bool], paused: Callable[[], bool] = lambda: False
     ) -> None:
         self.cancelled, self.paused = cancelled, paused
-        self.turn_began = self.worked = 0.0
+        self.turn_began = 0.0
         self._rates: dict[str, deque[float]] = {}  # items per second of the last pieces
 
     def piece(self, kind: str, seconds: float) -> int | None:
@@ -168,14 +167,6 @@ class Turns:
                 self._take_turn(worker)
         return min(turn if over else left, LONGEST_PIECE)
 
-    def clock(self) -> float:
-        """Return seconds that go by for the calling thread's work, to be subtracted.
-
-        In background work they stand still while frames go first.
-        """
-        worker, now = self.thread.worker, time.perf_counter()
-        return now if worker is None else worker.worked + now - worker.turn_began
-
     def _next(self) -> Worker | None:
         """Return who waits for a turn first, and may work."""
         return next((worker for worker in self._waiting if not worker.paused()), None)
@@ -201,7 +192,6 @@ class Turns:
     def _end_turn(self, worker: Worker) -> None:
         with self._changed:
             if self._holder is worker:
-                worker.worked += time.perf_counter() - worker.turn_began
                 self._holder = None
                 self._changed.notify_all()
 
