@@ -318,12 +318,12 @@ class Memory(Turns):
         """Take back what a buffer has held."""
         with self._ledger:
             self.allocated, held.nbytes = self.allocated - held.nbytes, 0
-        try:
-            if held.in_place and not devices.forked:  # the array may go when the buffer has gone
+        if held.in_place and not devices.forked:
+            # The array may go when the buffer has gone. That the device is lost tells who reads
+            with contextlib.suppress(DeviceError):
                 self.finish()
-        finally:
-            if held.memory is not None:
-                held.memory.release()
+        if held.memory is not None:
+            held.memory.release()
 
     def pinned(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
         """Return an uninitialised array, into which a GPU copies several times as fast.
