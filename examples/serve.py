@@ -1,7 +1,7 @@
 """A volume that changes, served to web pages: it stays here, and pages turn what they were sent.
 
 What one should see: open the URL that is printed. A glowing ball swells as the slider "Time" moves;
-colours, opacity and a clipping plane are changed in the page. Ctrl-C ends the server.
+brightness, opacity and clipping are changed in the page. Ctrl-C ends the server.
 
 The port is the argument (8765 without one; 0 takes a free one).
 """
@@ -44,5 +44,4 @@ if __name__ == "__main__":
         cmap="inferno",
         opacity="sigmoid_5",
         clim=(0, 255),
-        announce=lambda line: print(line, flush=True),
     )

@@ -108,14 +108,7 @@ repair_plugin_loader() {
 
 check_plugin() (
     eval "$("$folder/bin/pyvista-vdi" paraview --environment)"
-    "$pvpython" -c '
-import os
-from paraview import simple
-import pyvista_vdi
-simple.VDISource, simple.VDIToImage, simple.VDIReader
-print(pyvista_vdi.describe_devices(), flush=True)
-os._exit(not any(device.usable for device in pyvista_vdi.list_devices()))
-' || fail "ParaView can make no VDI with $folder as it is: see above"
+    "$pvpython" -c 'from paraview.simple import VDISource' || fail "ParaView does not load it"
 )
 
 say_how() {

@@ -92,7 +92,6 @@ def view(options: argparse.Namespace) -> int:
                 actor.pause() if actor.playing else actor.play(RATE)
 
             plotter.add_key_event("space", toggle)
-            actor.add_time_slider(plotter)
         plotter.show()
     finally:
         plotter.close()

@@ -318,12 +318,13 @@ class Memory(Turns):
         """Take back what a buffer has held."""
         with self._ledger:
             self.allocated, held.nbytes = self.allocated - held.nbytes, 0
-        if held.in_place and not devices.forked:
-            # The array may go when the buffer has gone. That the device is lost tells who reads
-            with contextlib.suppress(DeviceError):
-                self.finish()
-        if held.memory is not None:
-            held.memory.release()
+        try:
+            if held.in_place and not devices.forked:  # the array may go when the buffer has gone
+                with contextlib.suppress(DeviceError):  # a device that is lost uses it no more
+                    self.finish()
+        finally:
+            if held.memory is not None:
+                held.memory.release()
 
     def pinned(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
         """Return an uninitialised array, into which a GPU copies several times as fast.

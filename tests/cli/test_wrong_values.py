@@ -65,7 +65,7 @@ ALIKE = {
 #: Wrong values of each option.
 WRONG = {
     **{f"--{name}": wrong for wrong, names in ALIKE.items() for name in names.split()},
-    "--angles": ("x", "''", "5,nan", "5,5"),
+    "--angles": ("x", "''", "5,nan"),
     "--background": ("x", "0,0", "0,0,2", "0,0,nan", "#12"),
     "--device": ("nothing", "99", "-1"),
     "--host": ("'no such host'", "999.1.1.1"),

@@ -4,7 +4,8 @@ import numpy as np
 import pyvista as pv
 from drop_in.stage import Kind
 from drop_in.volumes import grid
-from vtk_builds import vtk_or_skip
+
+from pyvista_vdi.vtk_pipeline.vtk import vtkBillboardTextActor3D
 
 kind = Kind("Neighbours in the scene")
 
@@ -50,7 +51,7 @@ def spline():
 
 
 def billboard(pl):
-    made = vtk_or_skip("vtkBillboardTextActor3D")()
+    made = vtkBillboardTextActor3D()
     made.SetInput("billboard")
     made.SetPosition(0.3, 0, 1)
     return made

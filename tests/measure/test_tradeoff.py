@@ -61,7 +61,7 @@ def test_the_command_writes_figures_and_a_table(shell, tmp_path, capsys, default
     settings = [{}, *({"max_supersegments": n} for n in (2, 3)), {"lists": 0.5}]
     assert [one["setting"] for one in found["points"]] == settings
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {f"tradeoff-ball.{kind}" for kind in ("json", "md")}
+    assert names == {f"tradeoff-ball.{kind}" for kind in ("json", "md", "png")}
     assert "memory against SSIM: " in capsys.readouterr().out
     assert cli.main([*run, "--sweep", "sides=2"]) == 1
     assert "--sweep knows no 'sides'" in capsys.readouterr().err

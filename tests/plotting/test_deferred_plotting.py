@@ -107,14 +107,15 @@ def test_what_is_shown_but_not_kept_is_warned_of_once(default_runtime, plotter, 
     ]
 
 
-def test_shading_that_is_switched_on_later_is_warned_of_and_left_out(default_runtime, plotter):
+def test_shading_that_is_switched_on_later_is_refused_in_a_sentence(default_runtime, plotter):
     actor = plotter.add_vdi(volume(), classification="deferred", show_scalar_bar=False)
     before = seen(plotter)
     actor.prop.shade = True
-    with pytest.warns(VDIWarning, match=r"shade = True.*needs gradients.*drawn without"):
+    with pytest.warns(VDIWarning, match=r"cannot be drawn.*shading needs gradients"):
         after = seen(plotter)
-    assert np.array_equal(before, after)
-    actor.prop.GetScalarOpacity().AddPoint(100, 1.0)  # is seen all the same, and nothing is said
+    assert np.array_equal(before, after), "what was shown stays"
+    actor.prop.shade = False
+    actor.prop.GetScalarOpacity().AddPoint(100, 1.0)
     assert np.abs(seen(plotter) - before).mean() > 0.2
 
 

@@ -41,7 +41,7 @@ ARGUMENTS = {
     "web_page.py": ["page.html"],
 }
 
-#: Those that serve, which write no picture: tests/extensions/web/test_served_examples.py runs them.
+#: Those that serve, which write no picture: tests/extensions/web/test_server.py runs them.
 SERVING = ["serve.py"]
 #: Those for several processes: tests/extensions/insitu/test_mpi.py runs them.
 PARALLEL = ["insitu.py"]

@@ -1,13 +1,11 @@
-"""What oiiotool (OpenImageIO) makes of our deep images, as tests have it.
+"""Two VDIs of which oiiotool (OpenImageIO) has made deep images, which are in ``tests/io/files``.
 
-Some of its files are recorded in ``tests/io/files``, so that they are read where it is not
-installed. They were made of images with an older attribute of ours, which is not read: they are as
-any program's.
+They were made of images with an older attribute of ours, which is not read: they are as any
+program's.
 """
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -18,20 +16,6 @@ RECORDED = Path(__file__).parents[1] / "io" / "files"
 VIEW = Camera((0.5, -0.25, 4), (0.5, 0, -1), (0, 1, 0), view_angle=40)
 SIZE = (8, 6)
 BOUNDS = {"a": (-1.9, 1.1, -1.2, 1.2, -1.0, 1.1), "b": (-0.2, 3.3, -1.4, 1.4, -1.7, 0.4)}
-
-#: Arguments of oiiotool by what they do; a and b are those of ``pair``.
-COMMANDS = {
-    "rewritten": "a.exr",
-    "tiled": "a.exr --tile 16 16",
-    "upwards": "a.exr --attrib openexr:lineOrder decreasingY",
-    "merged": "a.exr b.exr --deepmerge",
-    "half": "a.exr -d half",
-    "cropped": "a.exr --crop 3x4+1+2",
-    "cut": "a.exr --cut 4x3+1+2",
-    "resized": "a.exr --resample 16x12",
-    "moved": "a.exr --origin +2+1",
-    "flat": "a.exr --flatten",
-}
 
 
 def pair() -> tuple[VDI, VDI]:
@@ -61,13 +45,3 @@ def _half(first: int, last: int, deeper: float, origin: float, name: str) -> VDI
         depth_origin=origin,
         metadata={"name": name},
     )
-
-
-def make(name: str, folder: Path, program: str) -> Path:
-    """Have oiiotool make one of the files in a folder."""
-    for vdi, letter in zip(pair(), "ab", strict=True):
-        vdi.save(folder / f"{letter}.exr")
-    output = f"oiiotool_{name}.exr"
-    command = [program, *COMMANDS[name].split(), "-o", output]
-    subprocess.run(command, cwd=folder, check=True, capture_output=True)
-    return folder / output

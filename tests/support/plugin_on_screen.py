@@ -109,7 +109,7 @@ def new_vdi_appears_by_itself():
 
 def show_blocks_and_the_new_vdi_comes():
     """The same in the blocking event loop of show(); other timers do not hear of ours."""
-    plotter, actor = scene(regenerate=lambda status: status.angle > 5)
+    plotter, actor = scene(settings=pvdi.Settings(regenerate_below=0.9999))
     seen, others = [], []
     interactor = plotter.render_window.GetInteractor()
 

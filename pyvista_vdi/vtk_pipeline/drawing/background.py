@@ -6,26 +6,18 @@ The methods are for the thread that draws; the thread that works knows nothing o
 
 from __future__ import annotations
 
-import time
 import weakref
 from collections.abc import Callable
 from typing import Any, Literal
 
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View
-from pyvista_vdi.quality.background import TRIAL_SIZE, BackgroundThread, Job, vdi_job
+from pyvista_vdi.quality.background import BackgroundThread, Job, vdi_job
 from pyvista_vdi.quality.plan import ViewEstimate
-from pyvista_vdi.quality.rate import FLOOR, reduced
 from pyvista_vdi.quality.view_error import ViewError, ViewErrorEstimator
-from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
-from pyvista_vdi.vtk_pipeline.drawing.images import VolumePicture
 from pyvista_vdi.vtk_pipeline.filters.source import Request
-
-#: Pictures that tell what a volume's rays cost, of which the fastest counts: what disturbs one by
-#: milliseconds has the volume seem too slow to be drawn, which no frame would ever correct.
-_TRIALS = 5
 
 
 class Estimator:
@@ -56,14 +48,14 @@ class Background:
 
     Attributes
     ----------
-    kind : {"vdi", "estimate", "trial"} or None
+    kind : {"vdi", "estimate"} or None
         What is being made, or waits to be taken.
     request : Request or None
         What that is made of.
     """
 
     def __init__(self) -> None:
-        self.kind: Literal["vdi", "estimate", "trial"] | None = None
+        self.kind: Literal["vdi", "estimate"] | None = None
         self.request: Request | None = None
         self._worker = BackgroundThread("pyvista-vdi generation")
         # The thread knows the worker alone, so that this can be collected while it works
@@ -118,23 +110,6 @@ class Background:
             return ViewEstimate(number, view, error.ssim, error.contrast)
 
         self._put("estimate", request, Job(judge, request.device))
-
-    def try_volume(self, request: Request) -> None:
-        """Draw the volume in vain: all is compiled then, and it is known what a ray takes."""
-
-        def draw(runtime: Runtime, _: Callable[[float], None]) -> tuple[float, float]:
-            camera, volume = request.screen.camera, VolumePicture(request)
-            volume.picture(FrameRequest(camera, (TRIAL_SIZE, TRIAL_SIZE)))
-            # By pictures of as many pixels as a preview has at least
-            trial = Frame.of(camera, reduced(request.screen.size, FLOOR), volume.bounds)
-            taken = []
-            for _trial in range(_TRIALS):
-                began = time.perf_counter()
-                volume.picture(FrameRequest(camera, trial.size))
-                taken.append(time.perf_counter() - began)
-            return trial.covered, min(taken)
-
-        self._put("trial", request, Job(draw, request.device))
 
     def _put(self, kind: Any, request: Request, job: Job) -> None:
         self.kind, self.request = kind, request

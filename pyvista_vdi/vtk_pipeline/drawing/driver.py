@@ -19,7 +19,7 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIErro
 from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.quality.plan import SETTLED, ssim_of
-from pyvista_vdi.quality.rate import reduced
+from pyvista_vdi.quality.rate import FLOOR, reduced
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.raycasting.picking import FirstHit, Pick, pick_vdi
 from pyvista_vdi.raycasting.prepared import release_from_devices
@@ -35,6 +35,10 @@ from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.interaction.timer import PERIOD, Timer
 from pyvista_vdi.vtk_pipeline.interaction.window import Window, now
 from pyvista_vdi.vtk_pipeline.vtk import vtkWeakReference, weakly
+
+#: Pictures as coarse as previews that tell what a volume's rays take, of which the fastest counts:
+#: what disturbs one by milliseconds has the volume seem too slow to be drawn.
+_TRIALS = 5
 
 
 class Driver(Planner):
@@ -199,6 +203,13 @@ class Driver(Planner):
         # A volume's first picture has kernels compiled and voxels sent to the device
         if sized.volume is None or sized.volume.pictures > 1:
             self.costs = self.costs.took(sized.way, sized.angle, sized.covered, seconds)
+        elif self.seen is not None and self.costs.volume is None:
+            coarse, taken = frame.coarser(reduced(frame.full_size, FLOOR)), []
+            for _ in range(_TRIALS):
+                began = now()
+                raycast(coarse, self.device, None)
+                taken.append(now() - began)
+            self.costs = self.costs.took("volume", 0.0, coarse.covered, min(taken))
         return drawn
 
     def _seen_in(self, frame: Frame) -> Frame | None:
@@ -269,9 +280,9 @@ class Driver(Planner):
             self.begin_at_rest(window)
         if not self.goes_on:
             self._timer.stop()
-        renderer = self.renderer()
-        if swapped and renderer is not None:
-            renderer.GetRenderWindow().GetInteractor().Render()
+        interactor = self._timer.interactor()
+        if swapped and interactor is not None:
+            interactor.Render()
 
     # Errors in a frame
 

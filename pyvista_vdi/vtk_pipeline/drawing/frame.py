@@ -95,11 +95,6 @@ class Frame:
         of = (renderer, actor, mapper, size, view, matrix)
         return cls(size, (x, y), camera, to_view, projection[2:], *of)
 
-    @classmethod
-    def of(cls, camera: Camera, size: tuple[int, int], bounds: tuple[float, ...]) -> Frame:
-        """Return a frame of no renderer, for what its view shows."""
-        return cls(size, (0, 0), camera, np.eye(4), np.eye(4)[2:], full_size=size, bounds=bounds)
-
     @property
     def window(self) -> Window:
         """The window that it is a frame of."""

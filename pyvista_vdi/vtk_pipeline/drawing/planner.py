@@ -89,7 +89,7 @@ class Planner:
         self.pictures, self.costs = Pictures(), Costs()
         self.view: View | None = None  # of the last frame
         self.seen: Seen | None = None  # the last frame that somebody watched
-        self._estimator, self._tried = Estimator(), False
+        self._estimator = Estimator()
         self._volume: VolumePicture | None = None
         self._wanted: tuple[Any, Request | None, Exception | None] | None = None  # and the stamp
         self._refused: tuple[Any, Any] | None = None  # a content that the device cannot draw
@@ -264,10 +264,6 @@ class Planner:
         if watched:
             # A hand that moves has the machine
             self.background.pause(SETTLED if seen.hand else 0)
-            new = made is None and not self._tried and self.background.kind is None
-            if new and wanted is not None and settings.draw != "volume":
-                self._tried = True
-                self.background.try_volume(wanted)
         return seen, sighted
 
     def _as_made(self, vdi: VDI, shown: Frame, request: Request | None = None) -> Made:
@@ -364,8 +360,7 @@ class Planner:
 
     def drop(self) -> None:
         """Cancel what is being made in the background."""
-        if self.background.kind != "trial":
-            self.background.drop()
+        self.background.drop()
         self.making = None
         if self.settings.draw == "vdi":
             self._volume = None  # which stood in
@@ -421,10 +416,7 @@ class Planner:
             return bool(another)
         kind, made, request = done
         if isinstance(made, BaseException):
-            if kind != "trial":
-                self._fail(made)
-        elif kind == "trial":
-            self.costs = self.costs.took("volume", 0.0, *made)
+            self._fail(made)
         elif kind == "estimate":
             self.estimate = made
         elif isinstance(self.input, SourceInput):

@@ -126,10 +126,15 @@ def accessors(
     def getter(self: Any) -> Any:
         return self._set.get(name, default)
 
-    setter.__doc__, getter.__doc__ = f"Set {what}.", f"Return {what}."
-    for method, verb in ((setter, "Set"), (getter, "Get")):
+    return named_pair(name, what, setter, getter)
+
+
+def named_pair(name: str, what: str, *methods: Callable[..., Any]) -> Any:
+    """Return the Set and Get of a setting with names, in ``CamelCase``, and docstrings."""
+    for method, verb, says in zip(methods, ("Set", "Get"), ("Set", "Return"), strict=True):
         method.__name__ = f"{verb}{name.title().replace('_', '')}"
-    return setter, getter
+        method.__doc__ = f"{says} {what}."
+    return methods
 
 
 class HeldByVTK:

@@ -300,8 +300,17 @@ def vdi_from_image(image: Any) -> VDI | DeferredVDI:
             f"the VDI's VTK form has version {version}, and this pyvista-vdi reads up to "
             f"{FORM_VERSION}: update pyvista-vdi"
         )
+    # Check the supersegments of each list: nothing is allocated for a window alone
+    width, height, depth = image.GetDimensions()
+    array = image.GetPointData().GetArray(COUNT)
+    counts = np.array(-1) if array is None else as_numpy(array)
+    flat = depth == 1 and counts.shape == (width * height,)
+    if not (flat and counts.dtype.kind in "ui" and (counts >= 0).all()):
+        raise InvalidVDIError(
+            f"the VDI's image has {width} x {height} x {depth} points, and needs a point array "
+            f"{COUNT!r} of whole numbers >= 0, one for each point of one plane"
+        )
     # Where each list begins, and where the last one ends
-    counts = _counts_of(image)
     offsets = np.zeros(len(counts) + 1, dtype=np.uint64)
     np.cumsum(counts, dtype=np.uint64, out=offsets[1:])
     arrays: dict[str, Any] = {}
@@ -313,30 +322,9 @@ def vdi_from_image(image: Any) -> VDI | DeferredVDI:
             arrays[name] = np.zeros((0, 3) if components == 3 else 0, dtype=np.float32)
         else:
             raise InvalidVDIError(f"the VDI's image lacks its field array {name!r}")
-    size = image.GetDimensions()[:2]
-    vdi = VDI(camera=view, window_size=size, offsets=offsets, **arrays, **entries)
+    vdi = VDI(camera=view, window_size=(width, height), offsets=offsets, **arrays, **entries)
     kept = about.get("deferred")
     return vdi if kept is None else DeferredVDI(vdi, kept)
-
-
-def _counts_of(image: vtk.vtkImageData) -> NDArray[Any]:
-    """Return the supersegments of each list, checked; nothing is allocated for a window alone."""
-    array = image.GetPointData().GetArray(COUNT)
-    if array is None:
-        raise InvalidVDIError(f"the VDI's image lacks its point array {COUNT!r}")
-    width, height, depth = image.GetDimensions()
-    counts = as_numpy(array)
-    if depth != 1 or counts.shape != (width * height,):
-        raise InvalidVDIError(
-            f"the VDI's image has {width} x {height} x {depth} points, and {COUNT!r} is of shape "
-            f"{counts.shape}: one whole number for each point of one plane is needed"
-        )
-    if counts.dtype.kind not in "ui" or (counts.size and counts.min() < 0):
-        raise InvalidVDIError(
-            f"{COUNT!r} must be whole numbers >= 0; got {counts.dtype} from "
-            f"{counts.min() if counts.size else 'no value'}"
-        )
-    return counts
 
 
 def to_vtk(name: str, array: NDArray[Any]) -> vtk.vtkDataArray:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidVDIError, warn_external
+from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.generation.deferred import warn_of_range
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
@@ -29,9 +29,6 @@ from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData
 
 #: What two equal sizes of pixels differ by at most.
 ROUNDING = 1e-6
-
-#: What of a transfer function no list of values can honour, and how a property has it.
-_OF_GRADIENTS = {"shading": "shading (shade = True)", "gradient_opacities": "gradient opacity"}
 
 
 class Input:
@@ -197,20 +194,20 @@ class SourceInput(Input):
 
     def note_scene(self, renderers: Sequence[Any], model_transform: NDArray[np.float64]) -> None:
         """Note a renderer that shows it, for its lights, unless none does, and where it stands."""
-        source, lit_by = self.source, self.source.GetLitBy()
+        source, lit_by = self.source, self.source.lit_by.Get()
         known = any(renderer is lit_by for renderer in renderers)
         if self.of_scene and not known and (self.alone or lit_by is None):
-            source.SetLitBy(renderers[0] if renderers else None)
+            source.lit_by.Set(renderers[0] if renderers else None)
         if self.alone:
             source.SetPlace(model_transform)
         source.CheckLights()
 
     def keep_lights(self, closed: Sequence[Any]) -> None:
         """Keep the lights of the renderer that lights it, if that is one of those that close."""
-        lit_by = self.source.GetLitBy()
+        lit_by = self.source.lit_by.Get()
         if self.of_scene and any(renderer is lit_by for renderer in closed):
             self.source.GetLights()
-            self.source.SetLitBy(None)
+            self.source.lit_by.Set(None)
 
     @property
     def has_view(self) -> bool:
@@ -319,7 +316,6 @@ class DeferredInput(Input):
         self._values, self.prop = values, prop
         self._made_at: Any = None
         self._look: TransferFunction | None = None  # of the VDI that was made last
-        self._left_out: list[str] = []
 
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
@@ -348,25 +344,13 @@ class DeferredInput(Input):
         return [] if self._vdi is None else [self._vdi, self.deferred]
 
     def vdi(self) -> VDI | None:
-        """Return the VDI that the property makes of the values now; warn of what it leaves out.
-
-        ``None`` where there are none yet, for there is no view.
-        """
+        """Return the VDI that the property makes of the values now; ``None`` without a view."""
         values = self.deferred
         if values is None:
             return None
         stamp = self.stamp()
         if self._vdi is None or self._made_at != stamp:
             look = transfer_function_from_property(self.prop)
-            asked = [name for name in _OF_GRADIENTS if getattr(look, name) is not None]
-            look = look.replace(**dict.fromkeys(asked))
-            if asked and asked != self._left_out:
-                warn_external(
-                    f"{' and '.join(_OF_GRADIENTS[name] for name in asked)} of the volume property "
-                    "needs gradients, which a deferred VDI does not keep: it is drawn without; "
-                    "switch it off, or add the volume without classification='deferred'"
-                )
-            self._left_out = asked
             if self._vdi is None or self._look != look:  # the time stamp alone says little
                 self._vdi, self._look = classify_on_device(values, look), look
             self._made_at = stamp

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from pyvista_vdi.model.options import GenerationOptions, Option
+from pyvista_vdi.model.options import GenerationOptions
+from pyvista_vdi.vtk_pipeline.filters.algorithm import named_pair
 
 
 class OptionMethods:
@@ -16,23 +16,16 @@ class OptionMethods:
     """
 
 
-def _pair(told: Option) -> tuple[Callable[..., None], Callable[..., Any]]:
-    name = told.name
-
+def _pair(name: str, what: str) -> Any:
     def setter(self: Any, value: Any) -> None:
         self.SetOptions(replace(self.GetOptions(), **{name: value}))
 
     def getter(self: Any) -> Any:
         return getattr(self.GetOptions(), name)
 
-    setter.__doc__ = f"Set `{name}` of :func:`pyvista_vdi.generate`: {told.what}.\n\n{told.more}"
-    getter.__doc__ = f"Return {told.what}."
-    return setter, getter
+    return named_pair(name, f"`{name}` of :func:`pyvista_vdi.generate`: {what}", setter, getter)
 
 
 for _told in GenerationOptions.declared.values():
-    if _told.name != "lights":
-        for _verb, _method in zip(("Set", "Get"), _pair(_told), strict=True):
-            _method.__name__ = f"{_verb}{_told.name.title().replace('_', '')}"
-            _method.__qualname__ = f"OptionMethods.{_method.__name__}"
-            setattr(OptionMethods, _method.__name__, _method)
+    for _method in _pair(_told.name, _told.what) if _told.name != "lights" else ():
+        setattr(OptionMethods, _method.__name__, _method)

@@ -188,7 +188,7 @@ class VDISource(OptionMethods, Classifying):
         )
         self._camera: Camera | None = None
         self._lights = Lights()  # of the renderer, as they were read last
-        self._lit_by = vtkWeakReference()
+        self.lit_by = vtkWeakReference()  # the renderer whose lights are looked at
         self._placed: Any = None  # rows of the actor's matrix
         self._volume: Volume | None = None
         self._volume_key: Any = None
@@ -251,12 +251,12 @@ class VDISource(OptionMethods, Classifying):
         """
         renderer = lights if hasattr(lights, "GetTwoSidedLighting") else None
         require_this_build(type(renderer))
-        self._lit_by.Set(renderer)
+        self.lit_by.Set(renderer)
         self._take_lights(Lights.from_any(lights))
 
     def GetLights(self) -> Lights:
         """Return what a shaded volume is lit by; of a renderer, as its lights are now."""
-        renderer = self._lit_by.Get()
+        renderer = self.lit_by.Get()
         if renderer is not None:
             self._take_lights(Lights.from_any(renderer))
         return self._lights
@@ -271,14 +271,6 @@ class VDISource(OptionMethods, Classifying):
             self._lights = lights
             if self._is_shaded():
                 self.Modified()
-
-    def GetLitBy(self) -> Any:
-        """Return the renderer whose lights are looked at; ``None`` where there is none."""
-        return self._lit_by.Get()
-
-    def SetLitBy(self, renderer: Any) -> None:
-        """Look at the lights of another renderer; ``None`` leaves them as they were read last."""
-        self._lit_by.Set(renderer)
 
     def SetPlace(self, model_transform: ArrayLike) -> None:
         """Note the matrix, (4, 4), of the actor that the volume is shown by.
@@ -378,7 +370,7 @@ class VDISource(OptionMethods, Classifying):
         other = VDISource()
         other.SetInputConnection(self.GetInputConnection(0, 0))
         other.SetVolumeProperty(self.GetVolumeProperty())
-        other.SetLitBy(self.GetLitBy())
+        other.lit_by.Set(self.lit_by.Get())
         for name in ("camera", "lights", "placed", "volume", "volume_key", "vdi", "request"):
             setattr(other, f"_{name}", getattr(self, f"_{name}"))
         other._set = dict(self._set)

@@ -34,6 +34,11 @@ class Timer:
     tick : bound method
         Held weakly.
 
+    Attributes
+    ----------
+    interactor : callable
+        Returns the interactor, or ``None`` where there is none any more.
+
     Notes
     -----
     While a button is held, VTK's styles take all events of the interactor for themselves, and
@@ -45,7 +50,7 @@ class Timer:
 
     def __init__(self, tick: Callable[[], None]) -> None:
         self._tick = weakref.WeakMethod(tick)
-        self._interactor: Callable[[], Any] = lambda: None
+        self.interactor: Callable[[], Any] = lambda: None
         self._timer = 0
         self._period = PERIOD
         self._observers: tuple[int, ...] = ()
@@ -57,7 +62,7 @@ class Timer:
 
     def start(self, interactor: Any, period: int = PERIOD) -> None:
         """Tick every so many milliseconds, if it does not already, in this interactor."""
-        if interactor is not self._interactor() or interactor is None:
+        if interactor is not self.interactor() or interactor is None:
             self.stop()
         if interactor is not None and not (self.running and period == self._period):
             if not self._observers:
@@ -69,14 +74,14 @@ class Timer:
     def stop(self) -> None:
         """End: nothing is left at the interactor."""
         self._pause()
-        interactor = self._interactor()
+        interactor = self.interactor()
         if interactor is not None:
             for observer in self._observers:
                 interactor.RemoveObserver(observer)
         self._observers = ()
 
     def _pause(self) -> None:
-        interactor = self._interactor()
+        interactor = self.interactor()
         if interactor is not None and self.running:
             interactor.DestroyTimer(self._timer)
         self._timer = 0
@@ -104,5 +109,5 @@ class Timer:
         interaction = interactor.AddObserver("StartInteractionEvent", on_interaction)
         # Or a style that has taken all events would keep it from us
         interactor.GetCommand(interaction).PassiveObserverOn()
-        self._interactor = weakly(interactor)
+        self.interactor = weakly(interactor)
         self._observers = (ticks, interaction)

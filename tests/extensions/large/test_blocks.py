@@ -190,7 +190,7 @@ def test_blocks_keep_the_values_of_one_piece(budget, default_runtime):
         max_supersegments=budget,
         device=default_runtime,
     )
-    kept = Deferral("deferred", (20, 200), [2, 1])
+    kept = Deferral("deferred", (20, 200))
     whole = generate_deferred(asked, kept)
 
     def make(made):

@@ -3,11 +3,8 @@
 javascript/player.test.js has which is shown when, and what is said of wrong ones.
 """
 
-import zipfile
-
 import numpy as np
 import pytest
-from browsers import in_base64
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.cli import main
@@ -110,32 +107,6 @@ def test_it_plays_by_slider_button_and_keys(series, path, open_page):
     assert slider.input_value() == str(page.evaluate("viewer.series.nearest(viewer.time)"))
     with pytest.raises(Exception, match="is a number"):
         page.evaluate("() => { viewer.time = 'x'; }")
-
-
-def test_the_first_step_is_shown_while_the_rest_comes(series, path, open_page):
-    data = path.read_bytes()
-    with zipfile.ZipFile(path) as archive:
-        third = archive.getinfo("000002.vdi").header_offset
-    page = open_page(SIZE)
-    page.evaluate(
-        """([text, cut]) => {
-          const bytes = bytesOf(text), rest = Promise.withResolvers();
-          async function* pieces() {
-            yield textOf(bytes.subarray(0, cut - cut % 3));
-            await rest.promise;
-            yield bytes.subarray(cut - cut % 3);
-          }
-          window.goOn = rest.resolve;
-          window.loaded = viewer.load(pieces()).then(() => true);
-        }""",
-        [in_base64(data), third + 5],
-    )
-    page.wait_for("heard.some(([name]) => name === 'vditime')")
-    assert page.evaluate("[viewer.series.times.length, viewer.series.complete]") == [2, False]
-    page.evaluate("goOn()")
-    page.wait_for("viewer.series.complete")
-    assert page.evaluate("viewer.series.times") == list(series.times)
-    assert page.page.get_by_label("Time", exact=True).get_attribute("max") == str(N - 1)
 
 
 def test_a_page_plays_from_disk_and_is_read_and_converted_as_files_are(series, open_page, tmp_path):

@@ -261,10 +261,7 @@ def test_an_element_that_was_off_the_page_goes_on_loading(vdi, data, open_page):
     page.assert_shows(vdi, SIZE)
     page.evaluate(IN_PIECES, [in_base64(data)])
     page.evaluate("void (window.ready = viewer.ready)")
-    page.evaluate(  # a file that a visitor chose
-        "(text) => viewer.load(new File([bytesOf(text)], 'ball.vdi')).then(() => true)",
-        in_base64(data),
-    )
+    page.load(data)
     assert page.evaluate("Promise.all([first, ready]).then(() => viewer.status.state)") == "full"
     message = "viewer.screenshot().catch(({ message }) => message)"
     assert "off the page" in page.evaluate(f"viewer.remove(), {message}")

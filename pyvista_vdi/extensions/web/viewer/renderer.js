@@ -216,7 +216,7 @@ export class Renderer {
       throw new RangeError(`A screenshot is 1 to ${largest} pixels wide and high; ` +
         `got ${width} x ${height}.`);
     }
-    if (!this.#drawing) this.#give();
+    if (!this.#drawing || !this.#taken) this.#give(); // of other graphics nothing is drawn yet
     const target = pacer.target(width, height);
     try {
       require(await pacer.inBands(target, width, height, this.#painter([width, height])));
