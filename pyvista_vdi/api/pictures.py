@@ -298,7 +298,6 @@ def render_volume(
     NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
         If there is no device, or it fails.
     """
-    look.require_composite()
     view, read = Camera.from_any(camera), as_volume(volume, look.scalars, look.preference)
     drawn = options.drawn()
     if not as_flag(early_termination, "early_termination"):

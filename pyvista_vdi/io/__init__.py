@@ -5,7 +5,6 @@ from __future__ import annotations
 from pyvista_vdi.io.files import (
     check_write_options,
     checked_target,
-    is_vdi_file,
     read,
     read_info,
     suffixes,
@@ -23,7 +22,6 @@ __all__ = [
     "check_writable",
     "check_write_options",
     "checked_target",
-    "is_vdi_file",
     "read",
     "read_info",
     "suffixes",

@@ -10,7 +10,6 @@ from typing import Any, BinaryIO
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io.progress import Progress
-from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
@@ -102,17 +101,6 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
     VDIFileError is raised as by :func:`read`, but for damaged arrays.
     """
     return (format_of(path) or _own()).load().read_info(path)  # type: ignore[no-any-return]
-
-
-def is_vdi_file(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is to be read as a VDI: by its name, or else by its content.
-
-    It need not exist, and may be a folder.
-    """
-    found = format_named(path)
-    if found is not None and found.holds == "VDI":
-        return True
-    return os.path.isfile(path) and reader.begins_as_vdi(path)  # noqa: PTH113 - too long a name, too
 
 
 def checked_target(path: str | os.PathLike[str]) -> Path:

@@ -107,7 +107,6 @@ class Option:
 #: What documentation calls the types of ``model/types.py``.
 _WORDS = {
     "ArrayLike": "array_like of float",
-    "Blending": '{"composite", "maximum", "minimum", "average", "additive"}',
     "CameraLike": "pyvista.Camera or vtkCamera or Camera",
     "ColorMapLike": "str, list, matplotlib colour map or pyvista.LookupTable",
     "CroppingLike": "Cropping or vtkVolumeMapper or sequence of six numbers or pair",

@@ -93,7 +93,6 @@ Coverage: TypeAlias = Literal["bounds", "view"]
 Draw: TypeAlias = Literal["auto", "vdi", "volume"]
 #: When scalars are classified.
 When: TypeAlias = Literal["baked", "deferred"]
-Blending: TypeAlias = Literal["composite", "maximum", "minimum", "average", "additive"]
 #: When a view gets a VDI of its own.
 Policy: TypeAlias = Literal["auto", "never"]
 Metadata: TypeAlias = Mapping[str, Any]

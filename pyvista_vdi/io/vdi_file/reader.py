@@ -130,16 +130,6 @@ def read_info(path: str | os.PathLike[str], *, stream: BinaryIO | None = None) -
         return file.info
 
 
-def begins_as_vdi(path: str | os.PathLike[str]) -> bool:
-    """Whether a file begins as a .vdi file does; False where it cannot be read."""
-    try:
-        with Path(path).open("rb") as stream:
-            head = stream.read(_NAME_AT + len(DESCRIPTION))
-    except OSError:
-        return False
-    return head.startswith(_SIGNATURE) and head[_NAME_AT:] == DESCRIPTION.encode()
-
-
 class _OpenFile:
     """A .vdi file whose description has been read and checked."""
 

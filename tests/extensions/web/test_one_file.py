@@ -10,6 +10,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import io as files
 from pyvista_vdi.errors import VDIFileError
 from pyvista_vdi.extensions.web.page import page as page_of
+from pyvista_vdi.io.files import holds
 
 SIZE = (160, 90)
 VIEWPORT = {"width": 320, "height": 180}
@@ -95,7 +96,6 @@ def test_the_page_says_what_it_is(tmp_path):
     assert len(text) - data < 158_000  # the viewer's budget is 150 kB, the still picture's eight
     info = files.read_info(path)
     assert (info.path, info.codec, info.format_version) == (path, "deflate", 4)
-    assert files.is_vdi_file(path)
     unnamed = small_vdi().save(tmp_path / "small.html").read_text(encoding="utf-8")
     assert "<title>small</title>" in unnamed
 
@@ -103,7 +103,7 @@ def test_the_page_says_what_it_is(tmp_path):
 def test_a_foreign_page(tmp_path):
     path = tmp_path / "a.html"
     path.write_text("<!doctype html><p>hello")
-    assert files.is_vdi_file(path)  # by its name: no volume has it, and the sentence is a page's
+    assert holds(path) == "VDI"  # by its name: no volume has it, and the sentence is a page's
     for read in (pvdi.read, files.read_info):
         with pytest.raises(VDIFileError, match=r"a\.html is not a page with a VDI: it has no"):
             read(path)
