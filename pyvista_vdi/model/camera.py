@@ -189,10 +189,6 @@ class Camera:
     @classmethod
     def from_dict(cls, state: Mapping[str, Any]) -> Camera:
         """Return the camera that :meth:`to_dict` described."""
-        if not isinstance(state, Mapping):
-            raise InvalidCameraError(
-                f"a camera's description is a dictionary; got {type(state).__name__}"
-            )
         try:
             return cls(**state)
         except TypeError as error:  # an entry is missing, or unknown
