@@ -7,7 +7,6 @@ from pyvista_vdi.io.files import (
     checked_target,
     read,
     read_info,
-    suffixes,
     write,
 )
 from pyvista_vdi.io.png import to_bytes, write_png
@@ -24,7 +23,6 @@ __all__ = [
     "checked_target",
     "read",
     "read_info",
-    "suffixes",
     "to_bytes",
     "whole_file",
     "write",

@@ -20,11 +20,6 @@ from pyvista_vdi.model.whole_file import as_path, check_writable, with_suffix
 from pyvista_vdi.registry import FileFormat
 
 
-def suffixes() -> tuple[str, ...]:
-    """Return what the name of a file with a VDI may end in; the first is our own format."""
-    return tuple(each.suffix for each in registry.formats() if each.holds == "VDI")
-
-
 def format_named(path: Any) -> FileFormat | None:
     """Return the format that a file's name stands for; ``None`` if it stands for none."""
     name = str(path).lower().rstrip("/\\")  # as shells complete a folder's
@@ -106,11 +101,12 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
 def checked_target(path: str | os.PathLike[str]) -> Path:
     """Return a target, links followed; nothing is left behind.
 
-    Raises VDIFileError now if a VDI could not be written there later: its name ends in none of
-    :func:`suffixes`, or it cannot be written; MissingDependencyError if what writes it is missing.
+    Raises VDIFileError now if a VDI could not be written there later: its name is
+    that of no such format, or it cannot be written; MissingDependencyError if what writes it is missing.
     """
     target = as_path(path)
-    named = format_named(with_suffix(target, suffixes(), "a VDI"))
+    suffixes = tuple(each.suffix for each in registry.formats() if each.holds == "VDI")
+    named = format_named(with_suffix(target, suffixes, "a VDI"))
     if named is not None:
         named.load()  # what it needs is missed now
     return check_writable(target)

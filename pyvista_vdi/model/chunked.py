@@ -44,7 +44,6 @@ class ChunkedArray:
         checked: Callable[[NDArray[Any]], NDArray[Any]] | None = None,
         dtype: Any = None,
     ) -> None:
-        source = _by_absolute_path(source)
         library = type(source).__module__.partition(".")[0]
         self.lazy = source if library == "dask" else None
         self._array = source
@@ -181,16 +180,6 @@ def _file_of(array: Any) -> Path | None:
     store = getattr(array, "store", None)
     root = Path(str(getattr(store, "root", None) or getattr(store, "path", None)))
     return root / array.path if library == "zarr" and root.is_dir() else None
-
-
-def _by_absolute_path(array: Any) -> Any:
-    """Return an array of zarr whose folder has a relative path as one that has an absolute path."""
-    path = _file_of(array)
-    if path is None or path.is_absolute():
-        return array
-    import zarr
-
-    return zarr.open_array(os.path.abspath(path), mode="r")  # noqa: PTH100 - no links
 
 
 def closed(array: Any) -> Any:

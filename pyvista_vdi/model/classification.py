@@ -206,11 +206,6 @@ class Classification(Look, ArrayChoice):
                 "classified() of what is returned"
             )
 
-    @property
-    def in_place(self) -> bool:
-        """Whether a transfer function or a property stands in place of ``add_volume``'s."""
-        return any(getattr(self, name) is not None for name in IN_PLACE)
-
     def transfer_function_of(self, volume: Volume) -> TransferFunction:
         """Return the transfer function that the arguments describe for a volume.
 
@@ -222,11 +217,9 @@ class Classification(Look, ArrayChoice):
         if isinstance(table, TransferFunction):
             return table
         if table is not None:
-            meant = hasattr(table, "GetScalarOpacity")
             raise InvalidArgumentError(
                 "transfer_function must be a pyvista_vdi.TransferFunction; got "
-                f"{type(table).__name__}"
-                + (": pass a vtkVolumeProperty as volume_property=" if meant else "")
+                f"{type(table).__name__}: pass a vtkVolumeProperty as volume_property="
             )
         if self.volume_property is not None:
             from_property = registry.method("TransferFunction.from_property")

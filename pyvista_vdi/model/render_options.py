@@ -150,8 +150,6 @@ class FrameRequest:
 class DrawingOptions(Options):
     """How frames are drawn."""
 
-    elsewhere = "it is of add_vdi, how it draws; the least rate of still frames is full_fps"
-
     target_fps: float | None = option(
         30.0,
         "frames per second to be kept while the view moves",

@@ -129,7 +129,6 @@ def test_a_vdi_composites(blending):
         ({"opcity": 1}, "did you mean 'opacity'"),
         ({"qqqq": 1}, "known are volume, camera"),
         ({"tolerance": 0.1}, r"settings=pyvista_vdi\.Settings\(tolerance=\.\.\.\)"),
-        ({"target_fps": 9}, "it is of add_vdi.*full_fps"),
     ],
 )
 def test_an_unknown_keyword_is_a_type_error(given, message):

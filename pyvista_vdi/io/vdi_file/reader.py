@@ -103,7 +103,6 @@ class FileInfo:
     memory_bytes: int
     precision: str = "exact"
     depth_step: float = 1.0
-    #: Of lists that keep values: their range and what else is known of them.
     deferred: dict[str, Any] | None = None
 
 
