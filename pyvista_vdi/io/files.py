@@ -102,7 +102,7 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
     """Return a target, links followed; nothing is left behind.
 
     Raises VDIFileError now if a VDI could not be written there later: its name is
-    that of no such format, or it cannot be written; MissingDependencyError if what writes it is missing.
+    that of no such format, or it cannot be written; MissingDependencyError if that has no writer.
     """
     target = as_path(path)
     suffixes = tuple(each.suffix for each in registry.formats() if each.holds == "VDI")

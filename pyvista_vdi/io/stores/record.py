@@ -153,10 +153,6 @@ class StoredVolume(Volume):
         self.store, self.time, self.channel, self.unit = store, time, channel, store.unit
         self.unit_distance = store.levels[0].grid.default_unit_distance
 
-    def at_level(self, level: int | str) -> StoredVolume:
-        """Return another level, 0 for the finest; ``"auto"`` leaves it to the view."""
-        return StoredVolume(self.store, level, self.time, self.channel)
-
     def in_view(self, *cameras: Any, window_size: Sequence[int]) -> StoredVolume:
         """Return the finest level that one of several views requires.
 
@@ -167,7 +163,8 @@ class StoredVolume(Volume):
             return self
         grids = [one.grid for one in self.store.levels]
         views = map(Camera.from_any, cameras)
-        other = self.at_level(min(required_level(grids, view, window_size) for view in views))
+        level = min(required_level(grids, view, window_size) for view in views)
+        other = StoredVolume(self.store, level, self.time, self.channel)
         other.asked = False
         return other
 
