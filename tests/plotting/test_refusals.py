@@ -155,4 +155,34 @@ def test_a_vdi_without_transfer_function_has_no_scalar_bar(plotter, stored):
         plotter.add_vdi(vdi_of_one_list(), show_scalar_bar=True)
 
 
+#: Arguments that ``add_volume`` refuses as well, each by a builtin that scripts catch.
+REFUSED_BY_BOTH = [
+    {"scalars": "w"},
+    {"scalars": np.zeros(5)},
+    {"clim": (1, 2, 3)},
+    {"opacity": None},
+    {"opacity": "sigmoit"},
+    {"n_colors": 2.5},
+    {"cmap": 5},
+    {"mapper": "cpu"},
+    {"culling": "sideways"},
+    {"opcity": 1},
+    {"volume": pv.Sphere()},
+]
+
+
 # Processes that share the tests must have one name for each: none with an address in it
+@pytest.mark.parametrize("arguments", REFUSED_BY_BOTH, ids="-".join)
+def test_errors_are_those_of_add_volume_too(plotter, arguments):
+    arguments = {"volume": VOLUME.copy(), **arguments}
+    raised = []
+    for add in (plotter.add_volume, plotter.add_vdi):
+        with pytest.raises(Exception) as caught:  # noqa: PT011 - which is compared below
+            add(**arguments)
+        raised.append(caught.value)
+    vtks, ours = raised
+    builtins = [kind for kind in (TypeError, KeyError, ValueError) if isinstance(vtks, kind)]
+    assert builtins, f"add_volume raises {vtks!r}"
+    assert isinstance(ours, tuple(builtins)), f"{ours!r} in place of {vtks!r}"
+    assert isinstance(ours, errors.VDIError) or "keyword" in str(ours) or "culling" in arguments
+    assert not str(ours).startswith(("'", '"')), "KeyError's quotes"

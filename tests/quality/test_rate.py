@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from pyvista_vdi.quality.rate import FLOOR, FrameRate, reduced
+from pyvista_vdi.quality.rate import FLOOR, FrameRate
 
 FULL, TARGET, THRESHOLD = 1280 * 720, 30.0, 0.1
 PERIOD = 1 / TARGET
@@ -66,18 +66,3 @@ def test_full_where_that_fits_and_the_floor_where_nothing_does():
     chosen, _, _ = run(lambda k: (2 if k < 50 else 0.5) * (PERIOD - 4e-3) / FULL)
     assert (chosen[10:50] < FULL).all()
     assert (chosen[70:] == FULL).all()
-
-
-# A window
-
-
-def frame(pace, seconds, *, full=(100, 100), share=None, samples=0, beside=0.01):
-    """Draw a frame whose full image takes so many seconds; returns its share of the pixels."""
-    pace.began(samples)
-    if share is None:
-        share = pace.share(TARGET, math.prod(full), FLOOR)
-    size = reduced(full, share)
-    work = seconds * math.prod(size) / math.prod(full)
-    pace.drawn(size, full, work)
-    pace.ended(work + beside, True)
-    return share

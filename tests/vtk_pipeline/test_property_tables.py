@@ -7,6 +7,7 @@ import pytest
 from watched_windows import on_screen
 
 import pyvista_vdi as pvdi
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.vtk_pipeline.filters.convert import volume_to_image
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
@@ -186,3 +187,9 @@ def test_tables_are_getcolor_s(space, beyond, lone):
         # LabCIEDE2000 goes from byte to byte, and GetColor has a node itself
         away = 0.03 if space == 4 else 2e-3
         np.testing.assert_allclose(table.colors[int(scalar - low)], expected, atol=away)
+
+
+def test_a_logarithmic_scale_of_colours_is_refused():
+    prop = property_of(colors_of(*CURVED[1:-1], Scale=1))
+    with pytest.raises(UnsupportedError, match="logarithmic scale.*SetScaleToLinear"):
+        transfer_function_from_property(prop, ball())

@@ -64,6 +64,25 @@ def test_it_executes_only_when_something_has_changed():
     assert not source.GetVDI().equals(first)
 
 
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("Camera", r"has no camera \(SetCamera\)"),
+        ("WindowSize", r"no window size \(SetWindowSize\)"),
+        ("VolumeProperty", "no volume property"),
+        ("InputDataObject", "has no input"),
+    ],
+)
+def test_what_is_missing_is_named(setting, message, expected_messages):
+    source = ready_source(**{setting: None})
+    for ask in (source.Update, source.GetVDI):
+        with pytest.raises((errors.InvalidArgumentError, errors.InvalidVolumeError), match=message):
+            ask()
+    behind(source).Update()  # from C++: nothing can be raised
+    said = "0 connections" if setting == "InputDataObject" else "VDISource has no"
+    assert said in expected_messages.GetOutput()
+
+
 def file_of(image, path, writer):
     writer.SetInputData(image)
     writer.SetFileName(str(path))
