@@ -231,51 +231,6 @@ def test_a_plotter_and_its_viewer_have_one_camera(plotter, tmp_path):
 
 
 @pytest.mark.gl
-def test_a_plotter_s_series_plays_and_has_the_plotter_s_time(plotter, series):
-    actor = plotter.add_vdi(series, name="of two", show_scalar_bar=False)
-    widget = show(plotter)
-    assert (widget.vdi, widget.time) == (series, 0.0)
-    file, scene = widget._file, widget._scene
-    actor.time = 1.5
-    plotter.render()
-    assert widget.time == 1.5
-    widget.set_state({"time": 0.0})  # somebody has paused it there
-    assert actor.time == 0
-    actor.opacity_multiplier = 0.5
-    plotter.render()
-    assert widget._file is file
-    assert widget._scene != scene
-    plotter.add_vdi(pvdi.VDISeries(list(series), [0, 1]), name="another", show_scalar_bar=False)
-    words = r"all but one of 2 VDIs \(another\).*see all by"
-    with pytest.warns(UserWarning, match=words):
-        show_plotter(plotter)
-
-
-@pytest.mark.gl
-def test_a_scene_is_sent_again_when_something_in_it_is_another(plotter):
-    add_ball(plotter, regenerate="never")
-    sphere = plotter.add_mesh(pv.Sphere(), color="w")
-    widget = show(plotter)
-    scenes = [scene_of(widget)]
-    plotter.camera.azimuth = 30
-    plotter.render()
-    assert scene_of(widget) == scenes[0]  # the view has a trait of its own
-    for change in (
-        lambda: setattr(sphere.prop, "color", "red"),
-        lambda: setattr(sphere, "position", (1, 0, 0)),
-        lambda: plotter.add_text("a text"),
-        lambda: setattr(sphere, "visibility", False),
-    ):
-        change()
-        plotter.render()
-        scenes.append(scene_of(widget))
-    assert len(set(scenes)) == len(scenes)
-    plotter.set_background("w", top="b")
-    plotter.render()
-    assert any(str(value).startswith("linear-gradient") for value in widget.get_state().values())
-
-
-@pytest.mark.gl
 def test_a_view_that_rests_gets_a_vdi_of_its_own(plotter):
     """In the loop that cells run in."""
 
