@@ -5,7 +5,7 @@ import urllib.request
 
 import numpy as np
 import pytest
-from browsers import assert_axe_finds_nothing, picture
+from browsers import picture
 from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
@@ -85,17 +85,6 @@ def test_a_page_is_sent_what_its_view_needs(page):
     assert ssim_of(page) > ENOUGH
     page.page.get_by_label("Time step").fill("1")
     wait(page, "remote.received.vdis === 3")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-def test_axe_finds_nothing(scheme, server, open_page):
-    viewport = {"width": 390, "height": 700}
-    page = open_page(url=server.url, viewport=viewport, color_scheme=scheme)
-    wait(page, "remote.received.vdis === 1")
-    assert_axe_finds_nothing(page)
-    page.page.get_by_label("Settings", exact=True).first.click()
-    assert_axe_finds_nothing(page)
 
 
 def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
