@@ -261,6 +261,8 @@ def test_other_scenes_are_shown_as_ever(plotter, monkeypatch, request):
     add_ball(subplots)
     with pytest.warns(UserWarning, match="not subplots"):
         assert isinstance(show_plotter(subplots), Image.Image)
+    with pytest.raises(pvdi.InvalidArgumentError, match="one renderer, and this plotter has 2"):
+        subplots.vdi.export_html(None)
     subplots.close()
     add_ball(plotter)
     request.getfixturevalue("without_anywidget")

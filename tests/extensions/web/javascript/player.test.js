@@ -100,15 +100,6 @@ test("the last step that is asked for counts, and what was given up comes later"
   assert.throws(() => player.play({ rate: 0 }), /above 0/);
 });
 
-test("the last steps are kept, and no more of them", async () => {
-  const series = seriesOf(9), { player } = playing(series);
-  for (const step of [0, 1, 2, 3, 4, 5, 6, 7, 6, 3, 1]) {
-    player.step = step;
-    await settled();
-  }
-  assert.deepEqual(series.asked, [0, 1, 2, 3, 4, 5, 6, 7, 1]);
-});
-
 test("of a set the nearest is shown, and its neighbours are there", async () => {
   const view = (angle, distance = 4) => ({ position: [distance * Math.cos(angle), distance * Math.sin(angle), 0],
     view_angle: 30, model_transform: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] });
