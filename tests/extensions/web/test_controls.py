@@ -59,17 +59,13 @@ def ball(data, open_page):
 
 @pytest.fixture
 def from_disk(open_page, tmp_path):
-    """Open a page of a VDI, or of one that keeps values, with ``settings`` open or not."""
+    """Open a page of a VDI, or of one that keeps values."""
 
-    def from_disk(shown, *, settings=False, hash_="", **options):
+    def from_disk(shown, *, hash_="", **options):
         how = {} if isinstance(shown, pvdi.VDI) else {"transfer_function": look(START)}
         path = shown.save(tmp_path / "a.html", **how)
-        if settings:
-            options = {"viewport": {"width": 300, "height": 420}, **options}
         page = open_page(url=path.as_uri() + hash_, **options)
         page.ready()
-        if settings:
-            opened(page)
         return page
 
     return from_disk
@@ -222,7 +218,7 @@ def edit(page, points, clim):
     )
 
 
-def test_pictures_of_values_are_those_of_render(kept, from_disk):
+def test_pictures_of_values_are_those_of_render(kept, from_disk, tmp_path):
     # 8 bits, and float32 of two devices
     page, packed, turned = from_disk(kept), kept.with_precision("8-byte"), kept.camera.azimuth(20)
     for camera in (kept.camera, turned):
@@ -230,10 +226,17 @@ def test_pictures_of_values_are_those_of_render(kept, from_disk):
     for points, clim in OTHERS:
         edit(page, points, clim)
         assert_like(page, packed.classified(transfer_function=look(points, clim)), turned)
+    # Of exact values, without a look: means are looked up to a 3825th of the range
+    page.load(kept.save(tmp_path / "kept.vdi", compression="deflate").read_bytes())
+    page.evaluate("viewer.look = {}")
+    colors = page.evaluate("viewer.transferFunction.colors")
+    ramp = pvdi.TransferFunction(colors, np.linspace(0, 1, 256), RANGE)
+    assert_like(page, kept.classified(transfer_function=ramp), turned, 2.0)
 
 
 def test_mouse_keys_and_fingers_edit_and_a_link_has_it(kept, from_disk):
-    page = from_disk(kept, settings=True, **PHONE)
+    page = from_disk(kept, **PHONE)
+    opened(page)
     made = picture(page, SIZE)
     assert points_of(page) == START
     assert tabbed(page) == [*BAR, "Settings", *EDITOR, *CLIPS, "As it was made"]

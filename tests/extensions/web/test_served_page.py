@@ -26,14 +26,6 @@ SIZE = (240, 180)
 #: coincide: .94 to .97 where a full VDI is shown, below .9 by that of the view before.
 ENOUGH = 0.92
 
-#: Gives its sockets away.
-SOCKETS = """
-window.sockets = [];
-window.WebSocket = class extends WebSocket {
-  constructor(...given) { super(...given); sockets.push(this); }
-};
-"""
-
 
 @pytest.fixture(scope="module")
 def server(default_runtime):
@@ -44,7 +36,7 @@ def server(default_runtime):
 @pytest.fixture
 def page(server, open_page):
     viewport = {"width": SIZE[0], "height": SIZE[1] + 20}
-    return open_page(url=server.url, before=SOCKETS, viewport=viewport)
+    return open_page(url=server.url, viewport=viewport)
 
 
 def camera_of(page):
