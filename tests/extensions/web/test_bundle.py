@@ -1,9 +1,8 @@
 """The viewer's modules as one script: order, and what is left out."""
 
 import re
-from importlib import resources
 
-from pyvista_vdi.extensions.web.bundle import SPAWN, bundled, viewer_script
+from pyvista_vdi.extensions.web.bundle import bundled
 
 MODULES = {
     "a.js": 'import { b, B } from "./b.js";\nimport {\n  spawn,\n} from "./spawn.js";\n'
@@ -21,14 +20,3 @@ def test_what_is_needed_comes_first_and_once():
     assert "const { B, b, serve } = workerPart();" in script
     assert not re.search(r"\b(import|export)\b|twice$|Two lines|What|so$", script, re.MULTILINE)
     assert "workerPart" not in bundled(MODULES, ["b.js"])
-
-
-def test_every_module_of_the_viewer_can_be_bundled():
-    folder = resources.files("pyvista_vdi.extensions.web") / "viewer"
-    modules = [entry for entry in folder.iterdir() if entry.name.endswith(".js")]
-    sources = {entry.name: entry.read_text(encoding="utf-8") for entry in modules}
-    for name in sources.keys() - {SPAWN}:
-        bundled(sources, [name])
-    # With its controls and its editor, as text
-    assert len(viewer_script()) <= 150_000
-    assert len(viewer_script("scene.js", "remote.js")) <= 175_000

@@ -157,13 +157,6 @@ def without_anywidget(monkeypatch):
         monkeypatch.delitem(sys.modules, f"pyvista_vdi.extensions.web.{name}", raising=False)
 
 
-def test_without_anywidget_there_is_a_picture_and_the_extra_is_named(vdi, without_anywidget):
-    data = vdi._repr_mimebundle_()
-    assert set(data) == {"text/plain", "image/png"}
-    assert "pyvista-vdi[notebook]" in data["text/plain"]
-    assert repr(vdi) in data["text/plain"]
-
-
 @pytest.fixture(scope="module")
 def series(vdi):
     dense = pvdi.generate(BALL, vdi.camera, SIZE, cmap="bone", opacity=[0, 0.5, 1])

@@ -62,10 +62,9 @@ def vdis(set_path):
     return read
 
 
-def shown_from(open_page, path, content=None):
+def shown_from(open_page, path):
     """Open a page that shows a file."""
-    files = {path.name: path.read_bytes() if content is None else content}
-    return open_page(SIZE, attributes=f'src="{path.name}"', files=files)
+    return open_page(SIZE, attributes=f'src="{path.name}"', files={path.name: path.read_bytes()})
 
 
 # -- series ----------------------------------------------------------------------------------------
@@ -123,11 +122,6 @@ def test_a_page_plays_from_disk_and_is_read_and_converted_as_files_are(series, o
     again = tmp_path / "b.vdis"
     assert main(["convert", str(path), "-o", str(again)]) == 0
     assert all(a.equals(b) for a, b in zip(pvdi.read(again), series, strict=True))
-    text = path.read_bytes()
-    assert text.count(b'<script type="application/vdi+base64">') == 2
-    path.write_bytes(text[: text.rindex(b"</script>") - 3000])
-    with pytest.raises(pvdi.errors.VDIFileError, match="truncated"):
-        pvdi.read(path)
 
 
 # -- sets ------------------------------------------------------------------------------------------

@@ -163,12 +163,3 @@ test("a series is read from its beginning, as its steps come", async () => {
   assert.deepEqual([-1, 0.25, 0.3, 9].map((time) => series.nearest(time)), [0, 0, 1, 1]);
   await assert.rejects(Series.ofPieces(bytes.subarray(0, 90), [], () => {}), /no whole VDI/);
 });
-
-test("what a series' JSON says wrongly is refused by a sentence", async () => {
-  const set = { format: "pyvista-vdi-set", version: 1, views: [], bounds: [0, 1, 0, 1, 0, 1], camera: {} };
-  for (const [name, head, why] of [
-    ["series.json", {}, /no series of VDIs/], ["series.json", { ...SERIES, version: 7 }, /version 7/],
-    ["series.json", { ...SERIES, times: [0, null] }, /says what cannot be/],
-    ["series.json", { ...SERIES, times: [] }, /no whole VDI/], ["set.json", set, /set.json says what cannot be/],
-  ]) await assert.rejects(Series.ofPieces(zipped({ [name]: json(head) }), [], () => {}), why);
-});
