@@ -17,8 +17,6 @@ DECODED = """async (...texts) => {
   return Promise.all(texts.map((text) => told(decodeVDI(bytesOf(text)))));
 }"""
 
-PACKED = ("counts", "origin", "stride", "front", "back", "color", "optical_depth")
-
 
 def decoded(*files):
     return in_node(DECODED, *map(in_base64, files))

@@ -91,13 +91,8 @@ def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
     refusals = "ERR_CONNECTION|WebSocket|403"
     page = open_page(url=serving.url, viewport=viewport, expected=refusals)
     wait(page, "remote.received.vdis === 1")
-    height = page.evaluate("viewer.clientHeight")
     serving.close()
     wait(page, f"{line}.includes('no connection to the server; trying again in')")
-    # All of it can be read, and the viewer is as large as before
-    hidden = "(({ scrollHeight, clientHeight }) => scrollHeight - clientHeight)"
-    assert page.evaluate(f"{hidden}(document.querySelector('#status'))") == 0
-    assert page.evaluate("viewer.clientHeight") == height
     serving = serve("a", serving.port)
     wait(page, f"remote.received.vdis === 2 && !{line}.includes('trying')")
     serving.close()

@@ -14,9 +14,6 @@ from pyvista_vdi.model.vdi import VDI
 #: Odd, so that no ray of a smaller picture runs along a border of lists.
 SIZE = (161, 91)
 
-#: The last frame has all pixels.
-AT_REST = "heard.filter(([name]) => name === 'framedrawn').at(-1)?.[1].full"
-
 #: The view, as text.
 CAMERA = "JSON.stringify(viewer.camera)"
 
@@ -67,9 +64,7 @@ def test_a_file_is_shown_as_render_draws_it(vdi, data, open_page):
     page = open_page(SIZE, attributes='src="ball.vdi"', files={"ball.vdi": data})
     page.ready()
     status = page.evaluate("viewer.status")
-    told = [status[name] for name in ("state", "supersegments", "lists", "progress")]
-    assert told == ["full", vdi.n_supersegments, list(SIZE), 1]
-    page.wait_for(AT_REST)
+    assert (status["state"], status["supersegments"]) == ("full", vdi.n_supersegments)
     camera = page.evaluate("viewer.camera")
     for name in ("position", "focal_point", "view_up", "view_angle"):
         np.testing.assert_array_equal(camera[name], getattr(vdi.camera, name))
@@ -273,7 +268,7 @@ def test_viewers_share_one_context_and_make_up_for_a_lost_one(vdi, around):
 # -- pages -----------------------------------------------------------------------------------------
 
 
-def test_a_strict_policy_leaves_a_viewer_its_looks_and_its_shape_on_paper(around):
+def test_a_strict_policy_leaves_a_viewer_its_looks(around):
     head = """<meta http-equiv="Content-Security-Policy" content="default-src 'self'">"""
     early = """document.querySelector("vdi-viewer").clippingPlanes =
       [{ origin: [0, 0, 0], normal: [1, 0, 0] }];"""
@@ -284,8 +279,3 @@ def test_a_strict_policy_leaves_a_viewer_its_looks_and_its_shape_on_paper(around
     assert page.evaluate(looks) == [True, True, "block"]
     assert page.evaluate(f"({COVERED})(viewer)") > 0.1
     assert page.page.get_by_role("img", name="a ball").is_visible()
-    fit = "getComputedStyle(viewer.shadowRoot.querySelector('canvas')).objectFit"
-    assert page.evaluate(fit) == "fill"
-    page.page.emulate_media(media="print")
-    assert page.evaluate(fit) == "contain"
-    assert page.page.get_by_role("group", name="Controls of the picture").count() == 0

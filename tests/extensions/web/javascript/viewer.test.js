@@ -8,7 +8,7 @@ const { dragOf, dragged, keyed } = await viewerModule("interaction.js");
 const { textOfView, viewOfText } = await viewerModule("link.js");
 const { checkedLook, isAsMade } = await viewerModule("look.js");
 const { frameOf, listSpace, pixelRays, modelPoint, pixelsOfBoxes } = await viewerModule("rays.js");
-const { checkedTransfer, editedFrom } = await viewerModule("values.js");
+const { editedFrom } = await viewerModule("values.js");
 const { GrowingBytes, crc32 } = await viewerModule("bytes.js");
 
 const camera = checkedCamera({
@@ -21,15 +21,6 @@ test("a view goes into text and comes back with every bit", () => {
     const look = checkedLook({ brightness: 2 ** 0.35, clip: [0.1, 1, 0, 1, 0, 0.7], transfer });
     assert.deepEqual(viewOfText(textOfView({ camera, look })), { camera, look });
   }
-});
-
-test("what is no transfer function is refused by name", () => {
-  for (const [transfer, why] of [
-    [{ cmap: "no", clim: [0, 1], points: [0, 1] }, /colour map is one of gray/],
-    [{ clim: [1, 0], points: [0, 1] }, /clim is two numbers/],
-    [{ clim: [0, 1], points: [0.5, 1, 0.4, 1] }, /1 to 64 points/],
-    [{ clim: [0, 1], points: [0, 2] }, /1 to 64 points/], [{ clim: [0, 1], points: [] }, /1 to 64 points/],
-  ]) assert.throws(() => checkedTransfer(transfer), { name: "TypeError", message: why });
 });
 
 test("a curve becomes few points, which are on it", () => {
