@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from browsers import assert_axe_finds_nothing, file_of, picture
+from browsers import assert_axe_finds_nothing, picture
 from in_node import in_node
 from PIL import Image
 from plugin_scenes import soft_ball
@@ -172,9 +172,10 @@ NOT_TAKEN = [
 ]
 
 
-def test_keys_that_it_takes_reach_nothing_else_and_others_do(vdi, open_page):
+def test_keys_that_it_takes_reach_nothing_else_and_others_do(data, open_page):
     """What is typed elsewhere is none of its, and arrows that it takes do not scroll the page."""
-    page = open_page(SIZE, data=file_of(vdi), before=LISTENING)
+    page = open_page(SIZE, before=LISTENING)
+    page.load(data)
     page.evaluate("document.body.append(...['input', 'p'].map((n) => document.createElement(n)))")
     page.evaluate("document.querySelector('p').tabIndex = 0, document.body.style.height = '5000px'")
     canvas = "viewer.shadowRoot.querySelector('canvas')"

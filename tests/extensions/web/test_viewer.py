@@ -81,7 +81,8 @@ def test_a_file_is_shown_as_render_draws_it(vdi, data, open_page):
 
 
 def test_looks_are_drawn_as_render_draws_them(vdi, data, open_page):
-    ball = open_page(SIZE, data=data)
+    ball = open_page(SIZE)
+    ball.load(data)
     turned = vdi.camera.azimuth(25)
     own = ball.screenshot(turned, SIZE).astype(float)
     denser = VDI(
@@ -205,12 +206,11 @@ def test_the_wheel_is_the_page_s_where_that_scrolls(around):
 SHOW = """async (names) => {
   const said = [];
   for (const name of names) {
-    heard.length = 0;
+    errors.length = 0;
     viewer.src = name;
     const outcome = await viewer.ready.then(() => "shown", (error) => error.message);
-    const told = heard.filter(([kind]) => kind === "error").map(([, { message }]) => message);
     const { state } = viewer.status, alert = viewer.shadowRoot.querySelector("[role=alert]");
-    said.push({ alert: alert.hidden ? "" : alert.innerText, state, told, outcome });
+    said.push({ alert: alert.hidden ? "" : alert.innerText, state, told: [...errors], outcome });
   }
   return said;
 }"""
