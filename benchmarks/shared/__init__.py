@@ -115,7 +115,7 @@ def parser_of(
     doc: str | None,
     *,
     size: tuple[int, int] = (640, 360),
-    volumes: Sequence[str] | None = examples.WHOLE,
+    volumes: Sequence[str] | None = tuple(sorted({*examples.VOLUMES} - {"ct"})),
     repeats: int | None = None,
 ) -> argparse.ArgumentParser:
     """Return a parser with the options that every script has; without ``volumes`` not that one."""

@@ -13,7 +13,7 @@ import os
 import re
 import sqlite3
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from importlib.resources import files
@@ -217,9 +217,6 @@ def _with_includes(name: str, text: str) -> str:
 
 LOG_LINES_SHOWN = 30
 
-#: Called when a program begins to be compiled, which may take seconds; from any thread.
-on_compiling: set[Callable[[], object]] = set()
-
 _logger = logging.getLogger(__name__)
 _program_numbers = itertools.count(1)
 _kernel_lock = threading.RLock()
@@ -279,8 +276,6 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
     program = cl._cl._Program(context, source)
     level = logging.INFO if next(_program_numbers) == 1 else logging.DEBUG
     _logger.log(level, "compiling kernels: %s", path)
-    for tell in tuple(on_compiling):
-        tell()
     try:
         program._build(**call)
     except cl.Error as exc:

@@ -83,12 +83,20 @@ LAMP = Light("scene", (200, 300, 100), tuple(CENTRE), positional=True, cone_angl
 
 
 @pytest.mark.parametrize(
-    ("view", "looks"),
-    [("inside", {}), ("parallel", LIT)],  # gradients see beyond their brick
+    ("view", "looks", "colours"),
+    [
+        ("inside", {}, False),
+        ("parallel", LIT, False),  # gradients see beyond their brick
+        ("perspective", {}, True),
+    ],
 )
-def test_same_bytes_as_in_one_piece(runtime, used, view, looks):
+def test_same_bytes_as_in_one_piece(runtime, used, view, looks, colours):
     """A VDI and a picture with all that ends a ray."""
     camera, volume = VIEWS[view], volume_of()
+    if colours:
+        rgba = RNG.integers(0, 256, (*FIELD.shape[:2], 100, 4), dtype=np.uint8)
+        rgba[..., 3] = FIELD[..., :100] * 255
+        volume = Volume(rgba)
     function = transfer_for(volume, **looks)
     lights = [Light("camera", (1, 0.5, 0.2)), LAMP] if looks else None
     depth = np.full(WINDOW[::-1], np.inf)

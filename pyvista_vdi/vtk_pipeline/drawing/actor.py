@@ -93,12 +93,11 @@ class VDIActorMethods:
             If it has an ordinary volume mapper.
         """
         mapper = other.GetMapper() if hasattr(other, "GetMapper") else None
-        copied = None
-        if mapper is not None:
-            copied = mapper.NewInstance() if isinstance(mapper, VDIMapperMethods) else mapper
-            if copied is not mapper:
-                copied.ShallowCopy(mapper)
-        self.SetMapper(copied)
+        copied = mapper
+        if isinstance(mapper, VDIMapperMethods):
+            copied = mapper.NewInstance()
+            copied.ShallowCopy(mapper)
+        self.SetMapper(copied)  # which refuses VTK's
         super().ShallowCopy(other)  # type: ignore[misc]
         self._become_vdi_actor()  # VTK has it share the other one's shader
         self.SetMapper(copied)

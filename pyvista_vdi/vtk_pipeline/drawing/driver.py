@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
 from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.render_options import FrameRequest
@@ -83,10 +82,6 @@ class Driver(Planner):
         """Forget that actor, if it is this one."""
         if self._actor() is actor:
             self._actor = lambda: None
-
-    def runtime(self) -> Runtime:
-        """Return the device that raycasts."""
-        return get_runtime(self.device)
 
     def set_input(self, source: Input | None) -> None:
         """Draw another VDI, and show its bounds to VTK at once."""
@@ -161,7 +156,9 @@ class Driver(Planner):
             self._last = self._guarded(self._paint, mapper, renderer) or self._last
         drawn = self._last
         Window.of(window).pace.frame.preview |= drawn.preview
-        unit = self._texture.show(window, drawn.image, smooth=drawn.smooth)
+        # Pixels are interpolated, but not where the neighbours are another actor's
+        smooth = drawn.preview and not drawn.joint
+        unit = self._texture.show(window, drawn.image, smooth=smooth)
         place_image(actor, unit, origin, size)
         self._no_depth.show(window, mapper)
         self.follow(window)

@@ -123,11 +123,6 @@ class Frame:
         return (*of, self.lit_from, self.blend)
 
     @property
-    def preview(self) -> bool:
-        """Whether the image is to have fewer pixels than the viewport."""
-        return self.size != self.full_size
-
-    @property
     def way(self) -> RenderMode:
         """What is raycast."""
         return "vdi" if self.volume is None else "volume"

@@ -111,11 +111,6 @@ class Drawn:
         """Whether it has fewer pixels than the viewport."""
         return self.full_size not in (None, self.image.shape[1::-1])
 
-    @property
-    def smooth(self) -> bool:
-        """Whether its pixels are interpolated: not where the neighbours are another actor's."""
-        return self.preview and not self.joint
-
     def shows(self, frame: Frame) -> bool:
         """Whether this is the image of exactly this frame."""
         if self.key != frame.key:

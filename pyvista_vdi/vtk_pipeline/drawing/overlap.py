@@ -40,11 +40,6 @@ class Group:
     frames: list[Frame] = field(default_factory=list)  # those that are drawn, the nearest first
     picture: OwnedImage | None = None
 
-    @property
-    def joint(self) -> bool:
-        """Whether they are several."""
-        return len(self.members) > 1
-
     def part(self, own: Frame) -> Drawn | None:
         """Return what an actor shows of the picture of all; ``None`` where it is alone by now."""
         mine = [f for f in self.frames if f.mapper is own.mapper]

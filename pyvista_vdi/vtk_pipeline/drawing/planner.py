@@ -121,7 +121,8 @@ class Planner:
             return self._stored(source, frame, view)
         # What is drawn in several views is out of date in none of them by itself
         one_view = len(renderers) == 1 and source.alone
-        joint = len(frame.window.shown_in(frame.renderer)) > 1 and group_of(frame).joint
+        several = len(frame.window.shown_in(frame.renderer)) > 1
+        joint = several and len(group_of(frame).members) > 1
         shown = self._planned(source, frame, joint=joint, one_view=one_view)
         if shown is None or shown.volume is None or not shown.volume.shaded:
             return shown

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyvista_vdi.device import get_runtime
 from pyvista_vdi.quality.rate import Pace
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.vtk import (
@@ -221,7 +222,7 @@ class Window:
             for driver in drivers:
                 driver.advance()
         self._foreground.close()
-        for runtime in {driver.runtime() for driver in drivers}:
+        for runtime in {get_runtime(driver.device) for driver in drivers}:
             self._foreground.enter_context(runtime.foreground())
         samples = window.GetMultiSamples()
         if samples and self.pace.slow_samples and self._may_go_without():
