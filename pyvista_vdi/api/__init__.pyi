@@ -10,7 +10,7 @@ from pyvista_vdi.model.collection import (VDICollection)
 from pyvista_vdi.model.deferred import (DeferredVDI)
 from pyvista_vdi.model.transfer_function import (TransferFunction)
 from pyvista_vdi.model.types import (
-    Blending, CameraLike, ClientLike, ColorMapLike, Coverage, Criterion, CroppingLike, DeviceLike,
+    CameraLike, ClientLike, ColorMapLike, Coverage, Criterion, CroppingLike, DeviceLike,
     Interpolation, LightsLike, MemoryLike, OcclusionLike, OpacityLike, Precision, Preference,
     Progress, Quality, RangeLike, ScalarsLike, ShownLike, VTKObject, VolumeLike, WindowSize,
 )
@@ -21,34 +21,34 @@ from typing import (Any, Literal, overload)
 @overload
 def generate(
     volume: VolumeLike, camera: CameraLike, window_size: WindowSize, *, scalars: ScalarsLike | None
-    = None, preference: Preference = 'point', blending: Blending | str | int = 'composite', clim:
-    RangeLike | None = None, n_colors: int = 256, opacity: OpacityLike = 'linear', cmap:
-    ColorMapLike | None = None, flip_scalars: bool = False, opacity_unit_distance: float | None =
-    None, log_scale: bool = False, shade: bool = False, ambient: float | None = None, diffuse: float
-    | None = 0.7, specular: float | None = 0.2, specular_power: float | None = 10.0, interpolation:
-    Interpolation = 'nearest', volume_property: VTKObject | None = None, transfer_function:
-    TransferFunction | None = None, classification: Literal['baked'] = 'baked', value_range:
-    RangeLike | None = None, quality: Quality | None = None, target_ssim: float | None = None,
-    full_fps: float | None = None, max_bytes: float | None = None, lights: LightsLike | None = None,
-    ambient_occlusion: OcclusionLike | None = None, max_supersegments: int = 20, precision:
-    Precision = 'exact', settings: Settings | None = None, client: ClientLike | None = None, device:
-    DeviceLike | None = None, progress: Progress | None = None,
+    = None, preference: Preference = 'point', blending: str | int = 'composite', clim: RangeLike |
+    None = None, n_colors: int = 256, opacity: OpacityLike = 'linear', cmap: ColorMapLike | None =
+    None, flip_scalars: bool = False, opacity_unit_distance: float | None = None, log_scale: bool =
+    False, shade: bool = False, ambient: float | None = None, diffuse: float | None = 0.7, specular:
+    float | None = 0.2, specular_power: float | None = 10.0, interpolation: Interpolation =
+    'nearest', volume_property: VTKObject | None = None, transfer_function: TransferFunction | None
+    = None, classification: Literal['baked'] = 'baked', value_range: RangeLike | None = None,
+    quality: Quality | None = None, target_ssim: float | None = None, full_fps: float | None = None,
+    max_bytes: float | None = None, lights: LightsLike | None = None, ambient_occlusion:
+    OcclusionLike | None = None, max_supersegments: int = 20, precision: Precision = 'exact',
+    settings: Settings | None = None, client: ClientLike | None = None, device: DeviceLike | None =
+    None, progress: Progress | None = None,
 ) -> VDI: ...
 @overload
 def generate(
     volume: VolumeLike, camera: CameraLike, window_size: WindowSize, *, scalars: ScalarsLike | None
-    = None, preference: Preference = 'point', blending: Blending | str | int = 'composite', clim:
-    RangeLike | None = None, n_colors: int = 256, opacity: OpacityLike = 'linear', cmap:
-    ColorMapLike | None = None, flip_scalars: bool = False, opacity_unit_distance: float | None =
-    None, log_scale: bool = False, shade: bool = False, ambient: float | None = None, diffuse: float
-    | None = 0.7, specular: float | None = 0.2, specular_power: float | None = 10.0, interpolation:
-    Interpolation = 'nearest', volume_property: VTKObject | None = None, transfer_function:
-    TransferFunction | None = None, classification: Literal['deferred'], value_range: RangeLike |
-    None = None, quality: Quality | None = None, target_ssim: float | None = None, full_fps: float |
-    None = None, max_bytes: float | None = None, lights: LightsLike | None = None,
-    ambient_occlusion: OcclusionLike | None = None, max_supersegments: int = 20, precision:
-    Precision = 'exact', settings: Settings | None = None, client: ClientLike | None = None, device:
-    DeviceLike | None = None, progress: Progress | None = None,
+    = None, preference: Preference = 'point', blending: str | int = 'composite', clim: RangeLike |
+    None = None, n_colors: int = 256, opacity: OpacityLike = 'linear', cmap: ColorMapLike | None =
+    None, flip_scalars: bool = False, opacity_unit_distance: float | None = None, log_scale: bool =
+    False, shade: bool = False, ambient: float | None = None, diffuse: float | None = 0.7, specular:
+    float | None = 0.2, specular_power: float | None = 10.0, interpolation: Interpolation =
+    'nearest', volume_property: VTKObject | None = None, transfer_function: TransferFunction | None
+    = None, classification: Literal['deferred'], value_range: RangeLike | None = None, quality:
+    Quality | None = None, target_ssim: float | None = None, full_fps: float | None = None,
+    max_bytes: float | None = None, lights: LightsLike | None = None, ambient_occlusion:
+    OcclusionLike | None = None, max_supersegments: int = 20, precision: Precision = 'exact',
+    settings: Settings | None = None, client: ClientLike | None = None, device: DeviceLike | None =
+    None, progress: Progress | None = None,
 ) -> DeferredVDI: ...
 def pick(
     vdi: ShownLike, camera: CameraLike, pixel: Sequence[float], window_size: WindowSize | None =
@@ -72,16 +72,16 @@ def render_depth(
 ) -> NDArray[np.float32]: ...
 def render_volume(
     volume: VolumeLike, camera: CameraLike, window_size: WindowSize, *, scalars: ScalarsLike | None
-    = None, preference: Preference = 'point', blending: Blending | str | int = 'composite', clim:
-    RangeLike | None = None, n_colors: int = 256, opacity: OpacityLike = 'linear', cmap:
-    ColorMapLike | None = None, flip_scalars: bool = False, opacity_unit_distance: float | None =
-    None, log_scale: bool = False, shade: bool = False, ambient: float | None = None, diffuse: float
-    | None = 0.7, specular: float | None = 0.2, specular_power: float | None = 10.0, interpolation:
-    Interpolation = 'nearest', volume_property: VTKObject | None = None, transfer_function:
-    TransferFunction | None = None, lights: LightsLike | None = None, ambient_occlusion:
-    OcclusionLike | None = None, clipping_planes: ArrayLike | None = None, cropping: CroppingLike |
-    None = None, opacity_multiplier: float = 1.0, settings: Settings | None = None, opaque_depth:
-    ArrayLike | None = None, early_termination: bool = True, device: DeviceLike | None = None,
+    = None, preference: Preference = 'point', blending: str | int = 'composite', clim: RangeLike |
+    None = None, n_colors: int = 256, opacity: OpacityLike = 'linear', cmap: ColorMapLike | None =
+    None, flip_scalars: bool = False, opacity_unit_distance: float | None = None, log_scale: bool =
+    False, shade: bool = False, ambient: float | None = None, diffuse: float | None = 0.7, specular:
+    float | None = 0.2, specular_power: float | None = 10.0, interpolation: Interpolation =
+    'nearest', volume_property: VTKObject | None = None, transfer_function: TransferFunction | None
+    = None, lights: LightsLike | None = None, ambient_occlusion: OcclusionLike | None = None,
+    clipping_planes: ArrayLike | None = None, cropping: CroppingLike | None = None,
+    opacity_multiplier: float = 1.0, settings: Settings | None = None, opaque_depth: ArrayLike |
+    None = None, early_termination: bool = True, device: DeviceLike | None = None,
 ) -> NDArray[np.float32]: ...
 class Settings:
     given: dict[str, Any]

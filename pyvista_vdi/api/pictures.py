@@ -109,12 +109,9 @@ def render(
     elif look:
         refuse_unknown(look, "render", _names(render))
     if isinstance(vdi, list | tuple) or model_transforms is not None:
-        remedies = {
-            "preview_samples": "give several a smaller window_size",
-            "transmittance_cutoff": "leave it out for several",
-        }
-        for name in RenderOptions.checked(**{name: options.pop(name) for name in remedies}).given:
-            raise InvalidArgumentError(f"{name} is for a single VDI: {remedies[name]}")
+        alone = {name: options.pop(name) for name in ("preview_samples", "transmittance_cutoff")}
+        for name in RenderOptions.checked(**alone).given:
+            raise InvalidArgumentError(f"{name} is for a single VDI: leave it out for several")
         from pyvista_vdi.raycasting.multi_vdi import common_window_size, placed_vdis, render_vdis
 
         several: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
@@ -298,7 +295,6 @@ def render_volume(
     NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
         If there is no device, or it fails.
     """
-    look.require_composite()
     view, read = Camera.from_any(camera), as_volume(volume, look.scalars, look.preference)
     drawn = options.drawn()
     if not as_flag(early_termination, "early_termination"):

@@ -111,7 +111,6 @@ def generate(
     >>> camera = filling_camera(volume.bounds, (640, 360))
     >>> vdi = pvdi.generate(volume, camera, (640, 360), cmap="bone")  # doctest: +SKIP
     """
-    look.require_composite()
     read = as_volume(volume, look.scalars, look.preference)
     if deferral.deferred:
         look.require_no_look()
@@ -212,7 +211,6 @@ def _table_of(look: Mapping[str, Any], ends: tuple[float, float]) -> TransferFun
     """Return the transfer function of a look, for values of a range."""
     refuse_unknown(look, "classified", (*declared(Classification), "device"))
     asked = Classification(**{name: value for name, value in look.items() if name != "device"})
-    asked.require_composite()
     for name in _SAID_BEFORE:
         if name in asked.given:
             raise InvalidArgumentError(

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
-from pyvista_vdi.io import check_writable, check_write_options, is_vdi_file, stores, volumes
+from pyvista_vdi.io import check_writable, check_write_options, stores, volumes
 from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.volumes.in_file import placed
@@ -115,7 +115,7 @@ def is_volume(options: argparse.Namespace) -> bool:
     """Whether FILE or ``--example`` names a volume, and not a VDI, a series or a set."""
     if options.example is not None:
         return True
-    if not is_vdi_file(options.file) and holds(options.file) in (None, "VDI"):
+    if holds(options.file) is None:
         return True
     refuse(options, OF_VOLUMES, f"volumes, and {printable(options.file)} is a VDI")
     return False

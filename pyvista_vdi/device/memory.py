@@ -206,13 +206,13 @@ class Memory(Turns):
         """Return uninitialised memory for kernels to write, downloaded when they have.
 
         On a CPU device it is the memory of the array that :meth:`download` returns, so that nothing
-        is copied, and that array holds what is written afterwards, too. ``lasting`` is as for
-        :func:`aligned_empty`; all else, and what is raised, as for :meth:`buffer`.
+        is copied, and that array holds what is written afterwards, too. ``lasting``: it is kept for
+        long, and not of the pool; all else, and what is raised, as for :meth:`buffer`.
         """
         flags, own = self.cl.mem_flags, np.dtype(dtype)
         if self.is_cpu and 0 not in shape:
             access = flags.READ_WRITE | flags.USE_HOST_PTR
-            return self._take(access, shape, own, name, lasting=lasting)
+            return self._take(access, shape, own, name)
         pooled = not (self.is_cpu or lasting or 0 in shape)
         return self._take(flags.READ_WRITE, shape, own, name, pooled=pooled)
 
@@ -260,7 +260,6 @@ class Memory(Turns):
         host: NDArray[Any] | None = None,
         *,
         writable: bool = True,
-        lasting: bool = False,
         pooled: bool = False,
     ) -> DeviceBuffer:
         """Return a buffer, filled from a host array or used in its place as the flags say.
@@ -291,7 +290,7 @@ class Memory(Turns):
 
             # Take it
             if in_place and host is None:
-                host = aligned_empty(shape, dtype, lasting=lasting)
+                host = aligned_empty(shape, dtype)
             with self.failing(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
                 if pooled and nbytes <= MOST_POOLED:
                     if self._pool.held_blocks > BLOCKS_HELD:  # of windows that were larger once

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pyvista_vdi.io.files import (
     check_write_options,
     checked_target,
-    is_vdi_file,
     read,
     read_info,
-    suffixes,
     write,
 )
 from pyvista_vdi.io.png import to_bytes, write_png
@@ -23,10 +21,8 @@ __all__ = [
     "check_writable",
     "check_write_options",
     "checked_target",
-    "is_vdi_file",
     "read",
     "read_info",
-    "suffixes",
     "to_bytes",
     "whole_file",
     "write",

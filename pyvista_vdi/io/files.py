@@ -10,7 +10,6 @@ from typing import Any, BinaryIO
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io.progress import Progress
-from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
@@ -19,11 +18,6 @@ from pyvista_vdi.model.packing import check_precision
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, check_writable, with_suffix
 from pyvista_vdi.registry import FileFormat
-
-
-def suffixes() -> tuple[str, ...]:
-    """Return what the name of a file with a VDI may end in; the first is our own format."""
-    return tuple(each.suffix for each in registry.formats() if each.holds == "VDI")
 
 
 def format_named(path: Any) -> FileFormat | None:
@@ -104,25 +98,15 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
     return (format_of(path) or _own()).load().read_info(path)  # type: ignore[no-any-return]
 
 
-def is_vdi_file(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is to be read as a VDI: by its name, or else by its content.
-
-    It need not exist, and may be a folder.
-    """
-    found = format_named(path)
-    if found is not None and found.holds == "VDI":
-        return True
-    return os.path.isfile(path) and reader.begins_as_vdi(path)  # noqa: PTH113 - too long a name, too
-
-
 def checked_target(path: str | os.PathLike[str]) -> Path:
     """Return a target, links followed; nothing is left behind.
 
-    Raises VDIFileError now if a VDI could not be written there later: its name ends in none of
-    :func:`suffixes`, or it cannot be written; MissingDependencyError if what writes it is missing.
+    Raises VDIFileError now if a VDI could not be written there later: its name is
+    that of no such format, or it cannot be written; MissingDependencyError if what writes it is missing.
     """
     target = as_path(path)
-    named = format_named(with_suffix(target, suffixes(), "a VDI"))
+    suffixes = tuple(each.suffix for each in registry.formats() if each.holds == "VDI")
+    named = format_named(with_suffix(target, suffixes, "a VDI"))
     if named is not None:
         named.load()  # what it needs is missed now
     return check_writable(target)

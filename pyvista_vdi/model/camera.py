@@ -189,10 +189,6 @@ class Camera:
     @classmethod
     def from_dict(cls, state: Mapping[str, Any]) -> Camera:
         """Return the camera that :meth:`to_dict` described."""
-        if not isinstance(state, Mapping):
-            raise InvalidCameraError(
-                f"a camera's description is a dictionary; got {type(state).__name__}"
-            )
         try:
             return cls(**state)
         except TypeError as error:  # an entry is missing, or unknown
@@ -272,19 +268,11 @@ class Camera:
         Raises
         ------
         InvalidArgumentError
-            If the sizes or the corner are not two whole numbers of pixels each.
+            If the sizes are not two whole numbers of pixels each.
         """
         window = np.array(check_window_size(window_size))
         tile = np.array(check_window_size(tile_size, name="tile_size"))
-        try:
-            first = np.asarray(corner)
-        except ValueError:  # lists of different lengths
-            first = np.empty(0)
-        if first.shape != (2,) or first.dtype.kind not in "iu":
-            raise InvalidArgumentError(
-                f"corner must be (column, row), two whole numbers of pixels; got {corner!r}"
-            )
-        centre = (2 * first + tile) / window - 1  # (u, v) in the window, v downwards
+        centre = (2 * np.asarray(corner) + tile) / window - 1  # (u, v) in the window, v downwards
         around = np.asarray(self.window_center) + centre * (1, -1)
         width_share, height_share = tile / window
         # The angle is that of the edge it is measured along; the other follows from the aspect

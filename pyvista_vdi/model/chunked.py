@@ -44,7 +44,6 @@ class ChunkedArray:
         checked: Callable[[NDArray[Any]], NDArray[Any]] | None = None,
         dtype: Any = None,
     ) -> None:
-        source = _by_absolute_path(source)
         library = type(source).__module__.partition(".")[0]
         self.lazy = source if library == "dask" else None
         self._array = source
@@ -183,36 +182,19 @@ def _file_of(array: Any) -> Path | None:
     return root / array.path if library == "zarr" and root.is_dir() else None
 
 
-def _by_absolute_path(array: Any) -> Any:
-    """Return an array of zarr whose folder has a relative path as one that has an absolute path."""
-    path = _file_of(array)
-    if path is None or path.is_absolute():
-        return array
-    import zarr
-
-    return zarr.open_array(os.path.abspath(path), mode="r")  # noqa: PTH100 - no links
-
-
-class _InFile:
-    """Where a data set of an HDF5 file is."""
-
-    def __init__(self, path: str, name: str) -> None:
-        self.path, self.name = path, name
-
-    def open(self) -> Any:
-        return importlib.import_module("h5py").File(self.path, "r")[self.name]
-
-
 def closed(array: Any) -> Any:
     """Return what is pickled in place of an array: of an HDF5 file's, where it is."""
     if type(array).__module__.partition(".")[0] == "h5py":
-        return _InFile(os.path.abspath(array.file.filename), array.name)  # noqa: PTH100 - no links
+        return os.path.abspath(array.file.filename), array.name  # noqa: PTH100 - no links
     return array
 
 
 def opened(array: Any) -> Any:
     """Return the array in whose place another was pickled."""
-    return array.open() if isinstance(array, _InFile) else array
+    if not isinstance(array, tuple):
+        return array
+    path, name = array
+    return importlib.import_module("h5py").File(path, "r")[name]
 
 
 def is_chunked(array: Any) -> bool:

@@ -6,24 +6,22 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from importlib.util import find_spec
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     InvalidArgumentError,
-    InvalidArgumentTypeError,
     InvalidVolumeError,
     MissingDependencyError,
     UnsupportedError,
 )
 from pyvista_vdi.model.arguments import refuse_unknown
-from pyvista_vdi.model.checks import Number, one_of
+from pyvista_vdi.model.checks import Number
 from pyvista_vdi.model.options import Options, declared, option, record
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import (
-    Blending,
     ColorMapLike,
     Interpolation,
     OpacityLike,
@@ -33,19 +31,6 @@ from pyvista_vdi.model.types import (
     VTKObject,
 )
 from pyvista_vdi.model.volume import Volume
-
-#: What may become of the scalars along a ray, as ``add_volume`` names it; the first is the default.
-BLENDINGS: tuple[Blending, ...] = get_args(Blending)
-
-#: PyVista's other names and VTK's numbers of blending modes.
-_BLENDING_NAMES: dict[Any, str] = dict(enumerate(BLENDINGS)) | {
-    "comp": "composite",
-    "max": "maximum",
-    "min": "minimum",
-    "avg": "average",
-    **{f"{name}_intensity": name for name in ("maximum", "minimum", "average")},
-    **dict.fromkeys(("add", "sum"), "additive"),
-}
 
 #: What may be given in place of the arguments above.
 IN_PLACE = ("volume_property", "transfer_function")
@@ -63,12 +48,15 @@ def range_to_classify(scalars: ScalarsLike | None, clim: RangeLike | None) -> Ra
     return float(np.nanmin(scalars)), float(np.nanmax(scalars))
 
 
-def _blending(mode: Any) -> str:
-    """Return a blending mode, as PyVista's mappers understand names and VTK's numbers."""
-    if not isinstance(mode, str | int):
-        raise InvalidArgumentTypeError(f"blending must be a name; got {mode!r}")
+def _composite(mode: Any) -> str:
+    """Return ``"composite"``, as PyVista and VTK call it, or refuse what a VDI does not have."""
     name = mode.lower() if isinstance(mode, str) else mode
-    return one_of(str(_BLENDING_NAMES.get(name, name)), "blending", BLENDINGS)
+    if isinstance(mode, str | int) and name in ("composite", "comp", 0):
+        return "composite"
+    raise UnsupportedError(
+        f"blending={mode!r} is not supported: a VDI stores what is composited along a ray; pass "
+        "blending='composite', or draw the volume itself by Plotter.add_volume"
+    )
 
 
 class Described(Options):
@@ -92,22 +80,13 @@ class ArrayChoice(Described):
     preference: Preference = option(
         "point", "which array, where points and cells both have one of that name"
     )
-    blending: Blending = option(
+    blending: str = option(
         "composite",
         "what becomes of the scalars along a ray",
         'As in ``add_volume``; a VDI has ``"composite"`` alone.',
-        check=_blending,
-        takes="Blending | str | int",
+        check=_composite,
+        takes="str | int",
     )
-
-    def require_composite(self) -> None:
-        """Refuse blend modes that a VDI does not have."""
-        if self.blending != BLENDINGS[0]:
-            raise UnsupportedError(
-                f"blending={self.blending!r} is not supported: a VDI stores what is composited "
-                "along a ray; pass blending='composite', or draw the volume itself by "
-                "Plotter.add_volume"
-            )
 
 
 @record
@@ -210,9 +189,7 @@ class Classification(Look, ArrayChoice):
         used.
         """
         refuse_unknown(given, function, (*declared(Classification), *others))
-        made = cls(**given)
-        made.require_composite()
-        return made
+        return cls(**given)
 
     def require_no_look(self) -> None:
         """Refuse a look where values are kept to be classified afterwards."""
@@ -229,11 +206,6 @@ class Classification(Look, ArrayChoice):
                 "classified() of what is returned"
             )
 
-    @property
-    def in_place(self) -> bool:
-        """Whether a transfer function or a property stands in place of ``add_volume``'s."""
-        return any(getattr(self, name) is not None for name in IN_PLACE)
-
     def transfer_function_of(self, volume: Volume) -> TransferFunction:
         """Return the transfer function that the arguments describe for a volume.
 
@@ -245,11 +217,9 @@ class Classification(Look, ArrayChoice):
         if isinstance(table, TransferFunction):
             return table
         if table is not None:
-            meant = hasattr(table, "GetScalarOpacity")
             raise InvalidArgumentError(
                 "transfer_function must be a pyvista_vdi.TransferFunction; got "
-                f"{type(table).__name__}"
-                + (": pass a vtkVolumeProperty as volume_property=" if meant else "")
+                f"{type(table).__name__}: pass a vtkVolumeProperty as volume_property="
             )
         if self.volume_property is not None:
             from_property = registry.method("TransferFunction.from_property")

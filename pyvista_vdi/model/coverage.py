@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
 from pyvista_vdi.model.vdi import VDI
 
@@ -30,8 +29,6 @@ def covering_view(
     camera: Camera,
     window_size: Sequence[int],
     corners: ArrayLike,
-    *,
-    max_lists_per_pixel: float = MAX_LISTS_PER_PIXEL,
 ) -> tuple[Camera, tuple[int, int]] | None:
     """Move a view's window so that it covers a volume, and nothing else.
 
@@ -42,12 +39,12 @@ def covering_view(
 
     ``camera``: the view on the screen, with the model transform in it. ``window_size``: the
     screen's width and height in pixels. ``corners`` (float, shape (n, 3)): points whose convex hull
-    contains the volume, model frame. ``max_lists_per_pixel``: most lists, as a multiple of the
-    window's pixels. Where the rectangle would need more, lists become larger than pixels, square as
+    contains the volume, model frame. Where the rectangle would need more lists than
+    :data:`MAX_LISTS_PER_PIXEL` times the window's pixels, they become larger than pixels, square as
     before, and their borders no longer coincide. Returns: The view with its own window centre and
     view angle (or parallel scale), and its window size. ``None`` if a corner is behind the eye or
     closer than a thousandth of the corners' diagonal: no window can cover them. Raises
-    InvalidArgumentError if the window size or the limit is out of range.
+    InvalidArgumentError if the window size is out of range.
 
     With t the tangents of the half angles and c the window centre, the pixel rectangle [x0, x1) of
     width w in a window of width W has t' = t w / W and c' t' = t (c + (x0 + x1) / W - 1); the same
@@ -55,17 +52,13 @@ def covering_view(
     """
     camera = Camera.from_any(camera)
     size = np.asarray(check_window_size(window_size), dtype=np.float64)
-    if not max_lists_per_pixel > 0:
-        raise InvalidArgumentError(
-            f"max_lists_per_pixel must be positive; got {max_lists_per_pixel!r}"
-        )
     pixels = projected(camera, window_size, np.asarray(corners, dtype=np.float64))
     if pixels is None:
         return None
     low = np.floor(pixels.min(axis=0) + SLACK)
     high = np.maximum(np.ceil(pixels.max(axis=0) - SLACK), low + 1)
     # Take as many lists as allowed, each a square
-    extent, most = high - low, max_lists_per_pixel * size.prod()
+    extent, most = high - low, MAX_LISTS_PER_PIXEL * size.prod()
     pitch = max(1.0, math.sqrt(extent.prod() / most), extent.max() / MAX_WINDOW_EDGE)
     lists = np.ceil(extent / pitch - SLACK)
     while not (lists.prod() <= most or (lists == 1).any()):

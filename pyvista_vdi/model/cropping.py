@@ -124,10 +124,6 @@ class Cropping:
             parts = [cropping]
         return cls(*parts) if len(parts) == 2 else cls(cropping)
 
-    def keeps(self, i: int, j: int, k: int) -> bool:
-        """Whether the i-th region along x, j-th along y and k-th along z is kept."""
-        return bool(self.regions >> (i + 3 * j + 9 * k) & 1)
-
     def parts_of_ray(
         self, origin: NDArray[np.float64], direction: NDArray[np.float64], first: float, last: float
     ) -> NDArray[np.float64]:
@@ -169,7 +165,11 @@ class Cropping:
             [i for i, some in enumerate((lo > x0, hi > lo, hi < x1)) if some]
             for (x0, x1), lo, hi in zip(box, low, high, strict=True)
         ]
-        regions = [region for region in itertools.product(*there) if self.keeps(*region)]
+        regions = [
+            (i, j, k)
+            for i, j, k in itertools.product(*there)
+            if self.regions >> (i + 3 * j + 9 * k) & 1
+        ]
         cuts = np.stack([low, high], axis=1)
         if not regions:
             return cuts, np.full((3, 2), np.nan)

@@ -123,12 +123,6 @@ class DeferredVDI(Lists):
         return (length * self.share).astype(np.float32)
 
     @property
-    def values(self) -> Floats:
-        """The means as scalars of the volume, float64 (n,)."""
-        low, high = self.value_range
-        return low + (high - low) * self.mean.astype(np.float64)
-
-    @property
     def nbytes(self) -> int:
         """Bytes of all arrays in memory."""
         return self._lists.nbytes

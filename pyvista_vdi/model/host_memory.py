@@ -1,8 +1,6 @@
 """The host's memory: how much there is, so that what cannot fit is refused; aligned arrays."""
 
-import contextlib
 import math
-import mmap
 from typing import Any
 
 import numpy as np
@@ -13,35 +11,17 @@ from pyvista_vdi.errors import DeviceMemoryError
 
 #: Bytes; arrays that begin at a multiple are used in place by CPU drivers instead of copied.
 HOST_ALIGNMENT = 4096
-#: Bytes of a huge page; on other processors than x86 it is at least a whole number of pages.
-_HUGE_PAGE = 2**21
-#: Bytes from which lasting arrays have mappings of their own.
-_LARGE = 2**22
 
 
-def aligned_empty(
-    shape: int | tuple[int, ...], dtype: DTypeLike, *, lasting: bool = False
-) -> NDArray[Any]:
+def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     """Return an uninitialised C-contiguous array that a CPU device can use without a copy.
 
-    Its data begin at a multiple of 4096 bytes. ``lasting``: it is made seldom and kept for long, so
-    that memory of its own pays, which Linux may give in huge pages. NumPy asks for them as well,
-    but also where it uses a part of one, which then takes all of it.
+    Its data begin at a multiple of 4096 bytes.
     """
     shape = (shape,) if isinstance(shape, int) else tuple(shape)
     nbytes = math.prod(shape) * np.dtype(dtype).itemsize
-    if lasting and nbytes >= _LARGE and hasattr(mmap, "MADV_HUGEPAGE"):
-        try:
-            memory = mmap.mmap(-1, nbytes + _HUGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-        except OSError as exc:
-            raise MemoryError(f"no memory for an array of {nbytes} bytes: {exc}") from exc
-        raw = np.frombuffer(memory, np.uint8)  # holds the mapping
-        start = -raw.ctypes.data % _HUGE_PAGE
-        with contextlib.suppress(OSError):  # a kernel without them
-            memory.madvise(mmap.MADV_HUGEPAGE, start, nbytes // _HUGE_PAGE * _HUGE_PAGE)
-    else:
-        raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
-        start = -raw.ctypes.data % HOST_ALIGNMENT
+    raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
+    start = -raw.ctypes.data % HOST_ALIGNMENT
     return raw[start : start + nbytes].view(dtype).reshape(shape)
 
 

@@ -4,14 +4,12 @@ import functools
 import os
 import reprlib
 import weakref
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import (
-    InvalidArgumentTypeError,
     InvalidVDIError,
     InvalidVolumeError,
     InvalidVolumeTypeError,
@@ -57,14 +55,15 @@ _kept: dict[int, tuple[tuple[Any, ...], Volume, weakref.ref[Any]]] = {}
 
 def _kept_volume(image: Any, scalars: str | None, preference: str) -> Volume:
     """Return the volume that a VTK image is, the same until the image is told to be modified."""
+    from_vtk = registry.method("Volume.from_vtk")
     matrix = getattr(image, "GetDirectionMatrix", None)
     if not hasattr(image, "GetMTime"):
-        return Volume.from_vtk(image, scalars, preference)  # which says what it is
+        return from_vtk(image, scalars, preference)  # type: ignore[no-any-return] # says what it is
     made_of = (scalars, preference, image.GetMTime(), matrix and matrix().GetMTime())
     kept = _kept.get(id(image))
     if kept is not None and kept[0] == made_of:
         return kept[1]
-    volume = Volume.from_vtk(image, scalars, preference)
+    volume: Volume = from_vtk(image, scalars, preference)
     forget = functools.partial(_kept.pop, id(image), None)
     _kept[id(image)] = made_of, volume, weakref.ref(image, lambda _: forget())
     return volume
@@ -98,15 +97,6 @@ def as_vdi(vdi: Any) -> VDI:
 def as_any_vdi(vdi: Any) -> VDI | DeferredVDI:
     """Return what :func:`as_vdi` returns, or a VDI that keeps values as it is."""
     return vdi if isinstance(vdi, DeferredVDI) else as_vdi(vdi)
-
-
-def each_of(vdis: Any) -> Iterable[Any]:
-    """Return several VDIs, or raise InvalidArgumentTypeError if these are not several things."""
-    if isinstance(vdis, str | bytes | os.PathLike) or not np.iterable(vdis):
-        raise InvalidArgumentTypeError(
-            f"vdis must be several VDIs; got {_described(vdis)}: pass a list of them"
-        )
-    return vdis  # type: ignore[no-any-return]
 
 
 def _described(thing: object) -> str:

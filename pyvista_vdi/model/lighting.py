@@ -202,11 +202,6 @@ class Lights:
         return [(light.kind, light.intensity) for light in self.lights] == [("headlight", 1.0)]
 
     @property
-    def positional(self) -> bool:
-        """Whether any light has a position."""
-        return any(light.positional for light in self.lights)
-
-    @property
     def of_scene(self) -> bool:
         """Whether any light stands in the world, and does not follow the camera."""
         return any(light.kind == "scene" for light in self.lights)

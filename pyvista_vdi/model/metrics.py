@@ -41,8 +41,6 @@ class Comparison:
         Peak signal to noise ratio in dB; infinite for equal images.
     worst_pixel : float
         Largest absolute difference of a channel, in units of 1/255.
-    worst_position : (int, int)
-        Column and row of that pixel, from the top left.
     mean_brightness_ratio : float
         Mean of the image's RGB over that of the reference; 1 where both are black.
     """
@@ -50,7 +48,6 @@ class Comparison:
     ssim: float
     psnr: float
     worst_pixel: float
-    worst_position: tuple[int, int]
     mean_brightness_ratio: float
 
 
@@ -138,7 +135,6 @@ def compare_images(
     if a.size == 0:
         raise InvalidArgumentError(f"the images are empty: their shape is {a.shape}")
     difference = np.abs(a - b)
-    row, column, _ = np.unravel_index(int(difference.argmax()), difference.shape)
     mean_square = float(np.mean(np.square(difference)))
     mean, reference_mean = float(a.mean()), float(b.mean())
     both_black = 1.0 if mean == 0 else math.inf
@@ -152,6 +148,5 @@ def compare_images(
         psnr=math.inf if mean_square == 0 else -10 * math.log10(mean_square),
         # Rounded to a millionth of a step: what float64 leaves of a whole number of steps
         worst_pixel=round(float(difference.max()) * 255, 6),
-        worst_position=(int(column), int(row)),
         mean_brightness_ratio=mean / reference_mean if reference_mean else both_black,
     )

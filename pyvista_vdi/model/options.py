@@ -107,7 +107,6 @@ class Option:
 #: What documentation calls the types of ``model/types.py``.
 _WORDS = {
     "ArrayLike": "array_like of float",
-    "Blending": '{"composite", "maximum", "minimum", "average", "additive"}',
     "CameraLike": "pyvista.Camera or vtkCamera or Camera",
     "ColorMapLike": "str, list, matplotlib colour map or pyvista.LookupTable",
     "CroppingLike": "Cropping or vtkVolumeMapper or sequence of six numbers or pair",
@@ -262,8 +261,6 @@ class MediumOptions(Options):
 class GenerationOptions(MediumOptions):
     """How a VDI is made."""
 
-    elsewhere = "it says how a VDI is made: give it to generate, or to add_vdi with a volume"
-
     max_supersegments: int = option(
         20,
         f"longest list, 1 to {MAX_SUPERSEGMENTS}",
@@ -318,8 +315,6 @@ class GenerationOptions(MediumOptions):
 class Deferral(Options):
     """When scalars are classified, and what is kept of them until then: docs/deferred.md."""
 
-    elsewhere = "values in place of colours are kept by generate, generate_series and InSitu"
-
     classification: When = option(
         "baked",
         "when scalars are classified: as the VDI is made, or by whoever shows it",
@@ -365,8 +360,6 @@ class Deferral(Options):
 @dataclass(frozen=True)
 class QualityTarget(Options):
     """What is asked of a VDI in place of settings, which are chosen to reach it: docs/dial.md."""
-
-    elsewhere = GenerationOptions.elsewhere
 
     quality: Quality | None = option(
         None,

@@ -6,6 +6,7 @@ depth of the ray's camera less a reference depth. The six numbers of each such f
 here in float64, so that an eye or an origin far away costs the kernels' float32 nothing.
 """
 
+import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import as_floats
 from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.host_memory import aligned_empty
@@ -23,9 +25,6 @@ Floats: TypeAlias = NDArray[np.float64]
 
 #: Depth before which nothing is looked up in perspective, in diagonals of the bounds ("Lengths").
 NEAREST_DEPTH = 1e-6
-
-#: Tangents of a hull between which :func:`cells_of_points` looks for cells.
-_TANGENTS = 32
 
 _AXES = np.eye(3)
 
@@ -283,47 +282,17 @@ def pixels_of_points(camera: Camera, window_size: tuple[int, int], points: Float
     whole = Rectangle(0, width, 0, height)
     if not len(points):
         return Rectangle(0, 0, 0, 0)
-    at = _pixels_at(camera, window_size, points)
-    if at is None:
+    matrix = camera.viewport_matrix(window_size) @ camera.model_to_view
+    x, y, _, d = matrix[:, :3] @ points.T + matrix[:, 3:]
+    if not d.min() > NEAREST_DEPTH * np.abs(d).max():
+        return whole
+    half = np.array([[width / 2], [height / 2]])
+    at = np.stack([x, y]) / d * half + half
+    if not np.isfinite(at).all():
         return whole
     low = np.clip(np.floor(at.min(axis=1) - 2), 0, window_size)
     high = np.clip(np.ceil(at.max(axis=1) + 2), 0, window_size)
     return Rectangle(int(low[0]), int(high[0]), int(low[1]), int(high[1]))
-
-
-def _pixels_at(camera: Camera, window_size: tuple[int, int], points: Floats) -> Floats | None:
-    """Return where model points are seen, pixels (2, n); None if one is not in front of the eye."""
-    matrix = camera.viewport_matrix(window_size) @ camera.model_to_view
-    x, y, _, d = matrix[:, :3] @ points.T + matrix[:, 3:]
-    if not d.min() > NEAREST_DEPTH * np.abs(d).max():
-        return None
-    half = np.array([[window_size[0] / 2], [window_size[1] / 2]])
-    at = np.stack([x, y]) / d * half + half
-    return at if np.isfinite(at).all() else None
-
-
-def cells_of_points(
-    camera: Camera, window_size: tuple[int, int], points: Floats, cell: int
-) -> NDArray[np.bool_]:
-    """Return which cells, so many pixels wide, the hull of model points may lie in.
-
-    bool (high, wide), bottom row first: those that two pixels more than the hull reach into, or
-    all of them, if a point is not in front of the eye.
-    """
-    wide, high = (-(-edge // cell) for edge in window_size)
-    if not len(points):
-        return np.zeros((high, wide), np.bool_)
-    at = _pixels_at(camera, window_size, points)
-    if at is None:
-        return np.ones((high, wide), np.bool_)
-    # Between tangents of the hull in some directions
-    angles = np.arange(_TANGENTS) * (2 * np.pi / _TANGENTS)
-    normals = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    reach = (normals @ at).max(axis=1) + 2
-    x, y = (np.arange(n) * cell + cell / 2 for n in (wide, high))
-    nearest = np.abs(normals).sum(axis=1) * cell / 2  # a cell's corner, from its centre
-    beyond = normals[:, 0, None, None] * x + normals[:, 1, None, None] * y[:, None]
-    return np.asarray((beyond - nearest[:, None, None] <= reach[:, None, None]).all(axis=0))
 
 
 def checked_opaque_depth(
@@ -335,12 +304,9 @@ def checked_opaque_depth(
     wanted = f"opaque_depth must have shape (height, width) = {window_size[::-1]}"
     depth = opaque_depth
     if not (isinstance(depth, np.ndarray) and depth.dtype in (np.float32, np.float64)):
-        try:
-            depth = np.asarray(opaque_depth, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise InvalidArgumentError(f"{wanted}; got {opaque_depth!r}") from error
+        depth = as_floats(opaque_depth)
     if depth.shape != window_size[::-1]:
-        raise InvalidArgumentError(f"{wanted}; got {depth.shape}")
+        raise InvalidArgumentError(f"{wanted}; got {depth.shape}: {reprlib.repr(opaque_depth)}")
     ends = aligned_empty(depth.shape, np.float32)
     with np.errstate(over="ignore"):  # beyond float32 is as good as never
         np.subtract(depth, rays.reference_depth, out=ends, dtype=np.float64, casting="same_kind")

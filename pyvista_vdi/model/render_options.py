@@ -50,9 +50,6 @@ def checked_planes(planes: Any) -> Planes:
     return tuple(map(tuple, table.tolist()))
 
 
-_RATE = Number("a number of frames per second, 0 or above")
-
-
 @record
 @dataclass(frozen=True)
 class SceneOptions(Options):
@@ -142,20 +139,10 @@ class FrameRequest:
         put = object.__setattr__
         put(self, "camera", Camera.from_any(self.camera))
         put(self, "size", check_window_size(self.size))
-        out, shape = self.out, (*self.size[::-1], 4)
-        if out is not None and (out.shape != shape or out.dtype != np.float32):
-            raise InvalidArgumentError(
-                f"out must be float32 of the image's shape {shape}; got {out.dtype}, {out.shape}"
-            )
 
     def replace(self, **changes: Any) -> FrameRequest:
         """Return the same request but for some of its fields."""
         return replace(self, **changes)
-
-
-def checked_rate(name: str, value: Any) -> float:
-    """Return a rate in frames per second; 0 or above, finite."""
-    return replace(_RATE, name=name)(value)  # type: ignore[no-any-return]
 
 
 @record
@@ -163,14 +150,12 @@ def checked_rate(name: str, value: Any) -> float:
 class DrawingOptions(Options):
     """How frames are drawn."""
 
-    elsewhere = "it is of add_vdi, how it draws; the least rate of still frames is full_fps"
-
     target_fps: float | None = option(
         30.0,
         "frames per second to be kept while the view moves",
         "By drawing fewer pixels. ``None``: the interactor's ``DesiredUpdateRate``, as for VTK's "
         "own levels of detail; 0: every frame is full.",
-        check=_RATE,
+        check=Number("a number of frames per second, 0 or above"),
     )
     adjust_multi_samples: bool = option(
         True,
@@ -209,11 +194,3 @@ class DrawingOptions(Options):
         '``"view"``: the window.',
         setting=True,
     )
-
-
-# Checks of VTK's setters of the same
-checked_bound: Any = DrawingOptions.declared["regenerate_below"].check
-checked_opacity_multiplier: Any = SceneOptions.declared["opacity_multiplier"].check
-checked_policy: Any = DrawingOptions.declared["regenerate"].check
-checked_draw: Any = DrawingOptions.declared["draw"].check
-checked_transmittance_cutoff: Any = RenderOptions.declared["transmittance_cutoff"].check

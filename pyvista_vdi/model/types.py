@@ -31,28 +31,6 @@ class VTKObject(Protocol):
         """Return the name of its class."""
 
 
-class ColorMap(Protocol):
-    """A colour map of Matplotlib."""
-
-    name: str
-    N: int
-
-
-class DeviceInUse(Protocol):
-    """An OpenCL device in use."""
-
-    @property
-    def info(self) -> Any:
-        """What is known of it."""
-
-
-class DaskClient(Protocol):
-    """A ``distributed.Client``."""
-
-    def scheduler_info(self) -> Any:
-        """Return what is known of the cluster."""
-
-
 #: Width and height, pixels.
 WindowSize: TypeAlias = Sequence[int]
 #: Called with the finished fraction, 0 to 1; work stops if it returns ``False``.
@@ -71,14 +49,14 @@ OcclusionLike: TypeAlias = Union[bool, float, "AmbientOcclusion"]
 #: Bytes, or a text such as ``"2 GiB"``.
 MemoryLike: TypeAlias = float | str
 #: A name or an index of the list of devices, or a device in use.
-DeviceLike: TypeAlias = str | int | DeviceInUse
+DeviceLike: TypeAlias = str | int | Any
 #: A client of a Dask cluster, or the address of its scheduler.
-ClientLike: TypeAlias = str | DaskClient
+ClientLike: TypeAlias = str | Any
 
 #: A name of an array, or the values.
 ScalarsLike: TypeAlias = ArrayLike
 #: A name, one colour, a list of colours, a colour map or a lookup table.
-ColorMapLike: TypeAlias = str | Sequence[str] | ColorMap | VTKObject
+ColorMapLike: TypeAlias = str | Sequence[str] | VTKObject | Any
 #: A name, one opacity, or opacities.
 OpacityLike: TypeAlias = ArrayLike
 #: The range of a colour map, or its end, which is symmetric then.
@@ -93,7 +71,6 @@ Coverage: TypeAlias = Literal["bounds", "view"]
 Draw: TypeAlias = Literal["auto", "vdi", "volume"]
 #: When scalars are classified.
 When: TypeAlias = Literal["baked", "deferred"]
-Blending: TypeAlias = Literal["composite", "maximum", "minimum", "average", "additive"]
 #: When a view gets a VDI of its own.
 Policy: TypeAlias = Literal["auto", "never"]
 Metadata: TypeAlias = Mapping[str, Any]

@@ -19,7 +19,7 @@ from pyvista_vdi.errors import (
     warn_external,
 )
 from pyvista_vdi.generation.deferred import kept_range
-from pyvista_vdi.io import is_vdi_file, read
+from pyvista_vdi.io import read
 from pyvista_vdi.io.files import holds
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.io.volumes import read_volume
@@ -269,7 +269,7 @@ def _blocks(plotter: Any, blocks: Any, asked: Addition) -> list[Any]:
 
 def _of_file(path: Any, asked: Addition) -> Any:
     """Return the VDI, series, set, store or volume in a file."""
-    if is_vdi_file(path) or holds(path) in ("series", "set"):
+    if holds(path) is not None:
         return read(path)
     scalars = asked.array.scalars
     return read_volume(path, array=scalars if isinstance(scalars, str) else None)
@@ -383,7 +383,6 @@ def _of_volume(volume: Any, asked: Addition, plotter: Any) -> _Shown:
 
 def _source(volume: Any, asked: Addition) -> VDISource:
     """Return a source of VDIs of a volume, made as it was asked for."""
-    asked.array.require_composite()
     image, name = as_grid(volume, asked.array.scalars, asked.making.resolution)
     data, preference = held(image), asked.array.preference
     named = None if name is None else data.GetPointData().GetArray(name)

@@ -21,7 +21,7 @@ from pyvista_vdi.device import DeviceBuffer, Launch, Runtime, get_runtime, padde
 from pyvista_vdi.device.constants import CELL, CELL_ITEMS, GROUP, SEGMENT_SIZE, SPARE_SLOTS
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.ray_forms import Rectangle, cells_of_points
+from pyvista_vdi.model.ray_forms import Rectangle, pixels_of_points
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose, choose_merge
@@ -251,8 +251,12 @@ class _Cells:
     @classmethod
     def of(cls, scenes: Sequence[Scene], size: tuple[int, int]) -> "_Cells":
         # Whether or not rays pass by what is empty: the picture is the same
-        corners = [(scene.camera, size, scene.prepared.occupancy.corners) for scene in scenes]
-        met = np.array([cells_of_points(*points, CELL) for points in corners])
+        wide, high = (-(-edge // CELL) for edge in size)
+        met = np.zeros((len(scenes), high, wide), np.bool_)
+        for cells, scene in zip(met, scenes, strict=True):
+            part = pixels_of_points(scene.camera, size, scene.prepared.occupancy.corners)
+            rows = slice(part.y0 // CELL, -(-part.y1 // CELL))
+            cells[rows, part.x0 // CELL : -(-part.x1 // CELL)] = True
         count = met.sum(axis=0)
         alone = np.choose(
             np.minimum(count, 2), [np.full_like(count, cls.NOBODY), met.argmax(axis=0), cls.SHARED]

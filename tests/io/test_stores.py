@@ -168,8 +168,8 @@ def test_hdf5(tmp_path):
     with h5py.File(path, "w") as file:
         one = file.create_dataset("deep/one", data=VALUES[0], chunks=(1, 4, 8, 8))
         one.attrs["element_size_um"] = [2.0, 0.5, 0.25]
-    volume = pvdi.read_volume(path, channel=1)  # the only one
-    assert volume.store.axes == ("t", "z", "y", "x")  # or of channels: nobody says it
+    volume = pvdi.read_volume(path, time=1)  # of the only one
+    assert volume.store.axes == ("t", "z", "y", "x")
     assert len(volume.store.times) == len(VALUES[0])
     np.testing.assert_array_equal(volume.at_time(0).load().array, VALUES[0, 0])
     assert volume.store.unit == "micrometer"

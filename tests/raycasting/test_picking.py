@@ -55,10 +55,10 @@ def test_a_deferred_vdi_says_the_value_that_is_hit():
     kept = kept_values(slabs_of_values, *values, unit_distance=1.0, sample_distance=0.01)
     # What is below 200 is transparent, and left out: the lists that are shown have other numbers
     look = pvdi.TransferFunction([[1, 1, 1]] * 3, [0, 0, 1], (100, 300))
-    values = set()
+    values, (low, high) = set(), kept.value_range
     for x, y in np.ndindex(8, 8):
         hit = pvdi.pick(kept, FACING, (x, y), opacity_threshold=0, transfer_function=look)
-        opaque = kept.values[kept.lists.list_at(x, y)]
+        opaque = low + (high - low) * kept.mean[kept.lists.list_at(x, y)].astype(np.float64)
         opaque = opaque[opaque > 200]  # nearest to the eye first
         assert (hit is None) == (len(opaque) == 0)
         if hit is not None:

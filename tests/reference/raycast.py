@@ -339,8 +339,8 @@ def kept_parts(
     parts: list[tuple[float, float]] = []
     for begin, end in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True):
         point = origin + (begin + end) / 2 * direction
-        region = (int(np.searchsorted(planes[axis], point[axis], "right")) for axis in range(3))
-        if not cropping.keeps(*region):
+        i, j, k = (int(np.searchsorted(planes[axis], point[axis], "right")) for axis in range(3))
+        if not cropping.regions >> (i + 3 * j + 9 * k) & 1:
             continue
         if parts and parts[-1][1] == begin:
             parts[-1] = (parts[-1][0], end)

@@ -26,7 +26,8 @@ from pyvista_vdi.cli.text import mebibytes, printable
 from pyvista_vdi.errors import InvalidArgumentError, naming
 from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.series import Called, VDISeries, check_range
-from pyvista_vdi.io import is_vdi_file, read, read_info
+from pyvista_vdi.io import read, read_info
+from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
@@ -41,8 +42,9 @@ _OF_VOLUMES = (*OF_VOLUMES, *LOOK, *PLACE, "view_angle", "sample_distance", "mem
 def series(options: argparse.Namespace) -> int:
     """Write a series of the files that are named: VDIs or volumes."""
     files = in_order(options.files)
-    of_vdis = is_vdi_file(files[0])
-    if any(is_vdi_file(file) != of_vdis for file in files):
+    kinds = {holds(file) for file in files}
+    of_vdis = kinds == {"VDI"}
+    if len(kinds) > 1:
         raise InvalidArgumentError("the files are VDIs or volumes, and not some of each")
     if of_vdis:
         refuse(options, (*_OF_VOLUMES, "scheduler", *declared(Deferral)), "volumes")

@@ -19,7 +19,7 @@ from pyvista_vdi.io.progress import Pieces
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.arguments import names_of, records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.classification import IN_PLACE, Classification
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import Deferral, GenerationOptions
@@ -132,7 +132,8 @@ class StepMaker:
         """Return a step's VDI."""
         volume = as_volume(volume, *self._scalars)
         volume = volume.in_view(self._camera, window_size=self._size)
-        if not (self._looks.in_place or self._options.get("classification") == "deferred"):
+        in_place = {*IN_PLACE} & {*self._looks.given}
+        if not in_place and self._options.get("classification") != "deferred":
             # A colour stands for the same value in all steps
             table = self._looks.transfer_function_of(volume)
             self._looks = Classification(transfer_function=table)

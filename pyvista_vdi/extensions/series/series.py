@@ -24,7 +24,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.inputs import as_vdi, each_of
+from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI
 
 
@@ -180,11 +180,11 @@ def as_steps(vdis: Any, what: str) -> Any:
 
     A sequence that makes or reads them when they are asked for is returned as it is.
     """
-    if isinstance(vdis, VDI | DeferredVDI):
+    if isinstance(vdis, str | bytes | os.PathLike) or not np.iterable(vdis):
         raise InvalidVDIError(f"{what} is made of several VDIs: pass them in a list")
     if isinstance(vdis, Sequence) and not isinstance(vdis, list | tuple | str | bytes):
         return vdis
-    steps = tuple(v if isinstance(v, DeferredVDI) else as_vdi(v) for v in each_of(vdis))
+    steps = tuple(v if isinstance(v, DeferredVDI) else as_vdi(v) for v in vdis)
     for i, step in enumerate(steps):
         check_range(step, getattr(steps[0], "value_range", None), f"number {i}")
     return steps

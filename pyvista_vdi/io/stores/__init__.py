@@ -8,8 +8,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import numpy as np
-
 from pyvista_vdi.io.stores.arrays import names_in, open_hdf5
 from pyvista_vdi.io.stores.record import Level, Store, StoredVolume
 from pyvista_vdi.io.stores.zarr import open_zarr
@@ -39,12 +37,7 @@ def open_store(
     channel: int | str = 0,
 ) -> StoredVolume:
     """Open a level of a store; the finest, unless one is asked for."""
-    store = store_at(path)
-    # Of four axes without names the first may be time or channel, whatever else time is
-    either = "t" in store.axes and "c" not in store.axes and not store.named
-    if either and np.array_equal(time, 0) and not isinstance(channel, str):
-        time, channel = channel, 0
-    return StoredVolume(store, level, time, channel)
+    return StoredVolume(store_at(path), level, time, channel)
 
 
 def store_at(path: str | os.PathLike[str]) -> Store:

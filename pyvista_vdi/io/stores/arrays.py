@@ -42,7 +42,7 @@ def only_array(path: str, inner: str, found: Mapping[str, Any]) -> tuple[str, An
 def array_store(path: str, named: tuple[str, Any], kind: str) -> Store:
     """Return an array that stands by itself, with what its attributes say of its voxels."""
     name, array = named
-    axes, are_named = _axis_names(array)
+    axes = _axis_names(array)
     check_axes(f"{path}::{name}", axes)
     attributes = dict(array.attrs)
     unit, spacing = "", attributes.get("spacing", attributes.get("element_size_um"))
@@ -62,7 +62,7 @@ def array_store(path: str, named: tuple[str, Any], kind: str) -> Store:
             f"{path}::{name}: element_size_um, spacing and origin must be three numbers, along "
             f"z, y and x ({error})"
         ) from error
-    return Store(path, (Level(name, array, grid),), axes, unit, (), kind, named=are_named)
+    return Store(path, (Level(name, array, grid),), axes, unit, (), kind)
 
 
 def check_axes(path: str, axes: tuple[str, ...]) -> None:
@@ -74,8 +74,8 @@ def check_axes(path: str, axes: tuple[str, ...]) -> None:
         )
 
 
-def _axis_names(array: Any) -> tuple[tuple[str, ...], bool]:
-    """Return the names that zarr 3, xarray or HDF5 have for an array's axes; whether they do."""
+def _axis_names(array: Any) -> tuple[str, ...]:
+    """Return the names that zarr 3, xarray or HDF5 have for an array's axes."""
     names: Any = getattr(getattr(array, "metadata", None), "dimension_names", None)
     names = names or array.attrs.get("_ARRAY_DIMENSIONS")
     if "axistags" in array.attrs:  # of ilastik and vigra
@@ -83,12 +83,12 @@ def _axis_names(array: Any) -> tuple[tuple[str, ...], bool]:
     names = names or [dimension.label for dimension in getattr(array, "dims", ())]
     short = [{"time": "t", "channel": "c"}.get(str(n).lower(), str(n).lower()) for n in names]
     if len(short) == array.ndim and set(short) >= {"z", "y", "x"}:
-        return tuple(short), True
+        return tuple(short)
     if array.ndim not in _UNNAMED:
         raise InvalidVolumeError(
             f"a volume has three axes, before them time and channel; got shape {array.shape}"
         )
-    return _UNNAMED[array.ndim], False
+    return _UNNAMED[array.ndim]
 
 
 def grid_of(shape: Sequence[int], spacing: Any = None, origin: Any = None) -> Grid:

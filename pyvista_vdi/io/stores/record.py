@@ -63,8 +63,6 @@ class Store:
         What it is, such as ``"OME-Zarr 0.5"``.
     clock : (float, float)
         Time from step to step, and that of the first.
-    named : bool
-        Whether it names its axes.
     """
 
     path: str
@@ -74,7 +72,6 @@ class Store:
     channels: tuple[str, ...] = ()
     kind: str = "zarr"
     clock: tuple[float, float] = (1.0, 0.0)
-    named: bool = True
 
     @property
     def times(self) -> tuple[float, ...]:

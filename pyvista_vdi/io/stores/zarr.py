@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,11 +27,6 @@ def open_zarr(path: str, inner: str) -> Store:
         raise MissingDependencyError(
             f"{path} needs zarr ({error}): pip install 'pyvista-vdi[files]'"
         ) from error
-    if int(zarr.__version__.split(".")[0]) < 3 and (Path(path) / "zarr.json").exists():
-        raise UnsupportedError(
-            f"{path} is of zarr's format 3, as OME-Zarr 0.5 is, and zarr {zarr.__version__} reads "
-            "format 2 alone: install zarr 3, which needs Python 3.11 or newer"
-        )
     try:
         # Other processes, and this one in another folder, open the same one
         node: Any = zarr.open(path if "://" in path else os.path.abspath(path), mode="r")  # noqa: PTH100
@@ -44,9 +38,6 @@ def open_zarr(path: str, inner: str) -> Store:
     if hasattr(node, "shape"):
         return array_store(path, (inner, node), "zarr")
     attributes = node.attrs.asdict()
-    if "bioformats2raw.layout" in {*attributes, *attributes.get("ome", {})} and "0" in node:
-        node, inner = node["0"], f"{inner}/0".strip("/")
-        attributes = node.attrs.asdict()
     described = attributes.get("ome", attributes)
     if "plate" in described or "well" in described:
         raise UnsupportedError(f"{path} is a plate of many images: open one, such as {path}::A/1/0")

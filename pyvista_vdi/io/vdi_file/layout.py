@@ -22,7 +22,7 @@ from pyvista_vdi.model.vdi import VDI
 FORMAT_VERSION, LEAST_VERSION = 4, 2
 
 #: What is written for each precision: version 3 only where version 2 has no place for it.
-_VERSION_OF = {"exact": 2, "8-byte": 3}
+VERSION_OF = {"exact": 2, "8-byte": 3}
 
 #: The codec of version 4, which browsers decode by themselves, and the version of no other.
 DEFLATE = "deflate"
@@ -96,11 +96,6 @@ class Layout:
             "shape": [self.n_rows, *self.row_shape],
             "filter": self.filter,
         }
-
-
-def version_of(precision: str, codec: str) -> int:
-    """Return the version that is written: the lowest that has a place for both."""
-    return FORMAT_VERSION if codec == DEFLATE else _VERSION_OF[precision]
 
 
 def layouts(

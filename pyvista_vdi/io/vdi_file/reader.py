@@ -103,7 +103,6 @@ class FileInfo:
     memory_bytes: int
     precision: str = "exact"
     depth_step: float = 1.0
-    #: Of lists that keep values: their range and what else is known of them.
     deferred: dict[str, Any] | None = None
 
 
@@ -128,16 +127,6 @@ def read_info(path: str | os.PathLike[str], *, stream: BinaryIO | None = None) -
     """
     with _OpenFile(path, stream) as file:
         return file.info
-
-
-def begins_as_vdi(path: str | os.PathLike[str]) -> bool:
-    """Whether a file begins as a .vdi file does; False where it cannot be read."""
-    try:
-        with Path(path).open("rb") as stream:
-            head = stream.read(_NAME_AT + len(DESCRIPTION))
-    except OSError:
-        return False
-    return head.startswith(_SIGNATURE) and head[_NAME_AT:] == DESCRIPTION.encode()
 
 
 class _OpenFile:

@@ -21,13 +21,14 @@ from pyvista_vdi.io.vdi_file.layout import (
     DEFERRED_NAME,
     DEFLATE,
     DESCRIPTION,
+    FORMAT_VERSION,
     INDEX,
     INDEX_DTYPE,
+    VERSION_OF,
     Layout,
     describe,
     layouts,
     to_json,
-    version_of,
 )
 from pyvista_vdi.model.packing import DEPTH_CODES, Packed8
 from pyvista_vdi.model.vdi import VDI, length_per_depth, with_arrays
@@ -81,7 +82,8 @@ def write_to(
     longest = int(vdi.counts.max())
     kind = next(kind for kind in ("<u1", "<u2", "<u4", "<u8") if longest <= np.iinfo(kind).max)
     counts = vdi.counts.ravel().astype(kind)
-    version, packing = version_of(vdi.precision, compression), vdi.packing
+    version = FORMAT_VERSION if compression == DEFLATE else VERSION_OF[vdi.precision]
+    packing = vdi.packing
     arrays = layouts(
         vdi.window_size,
         vdi.n_supersegments,

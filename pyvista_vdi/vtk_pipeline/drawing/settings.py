@@ -7,19 +7,14 @@ from dataclasses import Field, dataclass, field, fields
 from typing import Any, TypeVar
 
 from pyvista_vdi.model.checks import Number
-from pyvista_vdi.model.render_options import (
-    TRANSMITTANCE_CUTOFF,
-    checked_bound,
-    checked_draw,
-    checked_opacity_multiplier,
-    checked_policy,
-    checked_rate,
-    checked_transmittance_cutoff,
-)
+from pyvista_vdi.model.options import declared
+from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, DrawingOptions, RenderOptions
 from pyvista_vdi.model.types import Draw, Policy
 from pyvista_vdi.raycasting.picking import checked_opacity
 
 _Class = TypeVar("_Class", bound=type)
+
+_DECLARED: Any = declared(RenderOptions, DrawingOptions)
 
 
 def _setting(
@@ -42,7 +37,7 @@ class MapperSettings:
         "to give the better picture within the frame rate, and at rest by what is there sooner; "
         "elsewhere by the volume, or by a VDI that nearly the same view has already earned, never "
         "by time. Volumes that overlap in the picture are drawn by VDIs.",
-        checked_draw,
+        _DECLARED["draw"].check,
     )
     regenerate: Policy = _setting(
         "auto",
@@ -50,7 +45,7 @@ class MapperSettings:
         'what decides that a view needs a VDI of its own: ``"auto"`` or ``"never"``',
         'By ``"auto"`` an estimate of the view\'s error does, where somebody watches; by '
         '``"never"`` only ``actor.regenerate()``.',
-        checked_policy,
+        _DECLARED["regenerate"].check,
     )
     regenerate_below: float | None = _setting(
         None,
@@ -58,14 +53,14 @@ class MapperSettings:
         "the estimated SSIM below which a VDI does not do for a view",
         "``None`` is 0.95 where another VDI is made for it, and 0.98 with the detail of the "
         "picture's pixels where the volume is drawn in its place.",
-        checked_bound,
+        _DECLARED["regenerate_below"].check,
     )
     opacity_multiplier: float = _setting(
         1.0,
         "OpacityMultiplier",
         "the factor of the extinction of everything that is drawn",
         "It acts on the next frame, without another VDI: 2 is twice as dense, 0 transparent.",
-        checked_opacity_multiplier,
+        _DECLARED["opacity_multiplier"].check,
     )
     transmittance_cutoff: float = _setting(
         TRANSMITTANCE_CUTOFF,
@@ -73,7 +68,7 @@ class MapperSettings:
         "the light below which rays end, 0 to below 1",
         "No channel loses more than that. VTK's own volume mappers stop at about 1/255. VDIs that "
         "overlap are merged to the default.",
-        checked_transmittance_cutoff,
+        _DECLARED["transmittance_cutoff"].check,
     )
     image_distance: float = _setting(
         1.0,
@@ -108,7 +103,7 @@ class MapperSettings:
         "the frames per second that previews keep",
         "``None`` means the window's desired update rate, 0 that every frame is full. Several VDIs "
         "in a window keep the highest of their targets.",
-        lambda rate: None if rate is None else checked_rate("the target frame rate", rate),
+        _DECLARED["target_fps"].check,
     )
     off_screen: bool = _setting(
         False,

@@ -61,7 +61,12 @@ def require_image(data: Any) -> vtk.vtkImageData:
 
 
 def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "point") -> Volume:
-    """Return a VTK image's scalars and geometry: see :meth:`pyvista_vdi.Volume.from_vtk`."""
+    """Return the volume of a VTK image, with its origin, spacing, direction matrix and ghosts.
+
+    ``scalars`` names the array; the active scalars by default, else the only array there is.
+    ``preference`` says which, where points and cells both have one of that name. It shares memory
+    with the point array where that is contiguous and of a type that kernels read.
+    """
     image = require_image(image)
     array = scalars_of(image, scalars, preference)
     n = array.GetNumberOfComponents()

@@ -15,7 +15,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.extensions.paraview import cli as verb
 from pyvista_vdi.extensions.paraview.parts.client import require_one_process
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.vtk_pipeline import vdi_from_image
+from pyvista_vdi.vtk_pipeline import vdi_from_image, volume_from_vtk
 from pyvista_vdi.vtk_pipeline.vtk import BACKEND, vtk_to_numpy
 
 
@@ -75,7 +75,7 @@ def test_the_plugin_makes_a_vdi_and_its_picture(plugin, tmp_path, default_runtim
     shown = vtk_to_numpy(shown).reshape(30, 40, 4)[::-1]
     camera = filling_camera(ball.bounds, (40, 30), 20.0)
     ramp = pvdi.TransferFunction([(0, 0, 0), (1, 1, 1)], [0, 1], ball.get_data_range("v"))
-    unit_distance = pvdi.Volume.from_vtk(ball).default_unit_distance
+    unit_distance = volume_from_vtk(ball).default_unit_distance
     ramp = ramp.replace(interpolation="linear", unit_distance=unit_distance)
     expected = pvdi.generate(ball, camera, (40, 30), transfer_function=ramp)
     assert shown[..., 3].max() > 0.1
