@@ -25,6 +25,15 @@ from pyvista_vdi.model.options import (
 )
 from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 
+#: What has gone or moved, and what is done in its place.
+_GONE = {
+    "skip_empty": "what is empty is passed by, without being asked",
+    "status": "print(actor.status)",
+    "target_fps": "the rate of a window is add_vdi's; the least rate of still frames is full_fps",
+    "resample": "make a uniform grid by PyVista, pyvista.ImageData(...).sample(grid)",
+    "mask": "set the ghosts (vtkGhostType) of what is left out to 2, or make its opacity 0",
+}
+
 
 def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) -> None:
     """Raise TypeError for the first argument whose name is not known, and say what is meant."""
@@ -36,7 +45,7 @@ def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) ->
         elsewhere = (each.elsewhere for each in RECORDS if name in vars(each)["declared"])
         near = difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
-        hint = next(filter(None, elsewhere), hint)
+        hint = _GONE.get(name) or next(filter(None, elsewhere), hint)
         if "settings" in known and name in options and options[name].setting:
             hint = f"pass it by settings=pyvista_vdi.Settings({name}=...)"
         raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")

@@ -5,8 +5,6 @@ import pyvista as pv
 from drop_in.stage import Kind
 from drop_in.volumes import grid
 
-from pyvista_vdi.vtk_pipeline.vtk import vtkBillboardTextActor3D
-
 kind = Kind("Neighbours in the scene")
 
 INSIDE, LEFT = (0.4, -0.3, 0.3), (-0.6, 0.4, 0)
@@ -50,13 +48,6 @@ def spline():
     return pv.Spline(np.random.default_rng(0).uniform(-1, 1, (8, 3)), 60)
 
 
-def billboard(pl):
-    made = vtkBillboardTextActor3D()
-    made.SetInput("billboard")
-    made.SetPosition(0.3, 0, 1)
-    return made
-
-
 BARE = {"show_scalar_bar": False}
 CORNERS = np.array([[-1.0, -1, -1], [1, 1, 1], [1, -1, 1], [-1, 1, 1]])
 PLACES = np.array([[0.0, 0, 0], [1, 1, 1], [-1, 1, 0]])
@@ -74,7 +65,6 @@ mesh("lines as tubes", spline, **LINES)
 mesh("contours of the volume", lambda: grid().contour([150.0]), opacity=0.5, **BARE, both=True)
 mesh("a mesh of opacities", ball, scalars=VALUES, opacity="linear", **BARE)
 mesh("a PBR mesh", ball, pbr=True, metallic=0.6, roughness=0.4, color="w", both=True)
-BACK = {"color": "red"}
 mesh("a MultiBlock", lambda: ball_and(pv.Cube(center=LEFT, **EDGE)), both=True, quick=True)
 neighbour(
     "add_composite",
@@ -91,7 +81,6 @@ neighbour(
 method("add_axes", both=True)
 method("show_grid")
 method("add_bounding_box", color="k")
-FLOOR = {"opacity": 0.4, "color": "blue", "pad": 0.2}
 method("add_legend", [("one", "red"), ("two", "blue")], bcolor="w")
 neighbour("add_light", lambda pl: pl.add_light(pv.Light(position=(5, 5, 5), color="red")))
 

@@ -54,11 +54,6 @@ camera("view_angle", 70, "a wide view angle")
 method("set_focus", (0.8, 0, 0.5))
 
 
-def clip(pl):
-    pl.show(auto_close=False)
-    pl.camera.clipping_range = (pl.camera.distance - 0.3, pl.camera.distance + 0.5)
-
-
 def go_inside(pl):
     pl.camera_position = [(0.6, 0.3, 0.2), (-1, 0, -0.2), (0, 0, 1)]
     pl.renderer.ResetCameraClippingRange()

@@ -11,7 +11,7 @@ from plugin_scenes import LOOKS, WINDOW, shown, soft_ball
 from watched_windows import small_vdi
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import Cancelled, VDIWarning
+from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.vtk_pipeline.drawing import images
 from pyvista_vdi.vtk_pipeline.filters import source as source_module
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
@@ -148,25 +148,6 @@ def test_problem_in_a_frame_is_said_once_and_the_last_image_stays(plotter):
     np.testing.assert_array_equal(shown(plotter), before)
     actor.prop.SetTransferFunctionModeTo1D()
     np.testing.assert_array_equal(shown(plotter), before)
-
-
-def test_progress_reaches_a_callable_that_can_stop_the_work(plotter):
-    fractions = []
-
-    def stop(fraction):
-        fractions.append(fraction)
-        return False
-
-    actor = plotter.add_vdi(soft_ball(), progress_bar=stop, draw="vdi", **LOOKS)
-    with pytest.warns(VDIWarning, match="cannot be drawn: Cancelled") as said:
-        shown(plotter)  # three frames
-    assert len(said) == 1
-    assert len(fractions) > 1  # each frame tries again
-    with pytest.raises(Cancelled):
-        _ = actor.vdi
-    actor.mapper.GetSource().SetProgressCallback(fractions.append)
-    assert actor.regenerate().n_supersegments > 0
-    assert fractions[-1] == 1.0
 
 
 def exercise():

@@ -29,45 +29,6 @@ def ramp():
     return grid
 
 
-def turned(grid):
-    return np.float32(N - 1 - grid.points[:, 2])
-
-
-def write(name):
-    def change(grid):
-        grid[name][:] = grid[name].max() - grid[name]
-
-    return change
-
-
-def view_and(modified):
-    def change(grid):
-        np.asarray(grid["s"])[:] = turned(grid)
-        modified(grid)
-
-    return change
-
-
-CHANGES = {
-    "values in place": ({}, write("s")),
-    "values in place, by name": ({"scalars": "s"}, write("s")),
-    "values in place, of cells": ({"scalars": "c"}, write("c")),
-    "another array's values": ({"scalars": "x"}, write("s")),
-    "a view's values, array modified": (
-        {},
-        view_and(lambda grid: grid.GetPointData().GetArray("s").Modified()),
-    ),
-    "a view's values, grid modified": ({}, view_and(lambda grid: grid.Modified())),
-    "another array of that name": ({}, lambda grid: grid.__setitem__("s", turned(grid))),
-    "the same, by name": ({"scalars": "s"}, lambda grid: grid.__setitem__("s", turned(grid))),
-    "other active scalars": ({}, lambda grid: grid.set_active_scalars("x")),
-    "no such array": ({"scalars": "s"}, lambda grid: grid.point_data.remove("s")),
-    "origin": ({}, lambda grid: setattr(grid, "origin", (3, 0, 0))),
-    "spacing": ({}, lambda grid: setattr(grid, "spacing", (1, 1, 0.5))),
-    "another grid": ({}, lambda grid: grid.copy_from(pv.ImageData(dimensions=(4, 4, 4)))),
-}
-
-
 @pytest.fixture
 def plotter():
     plotter = pv.Plotter(window_size=WINDOW, off_screen=True)
@@ -81,28 +42,6 @@ def swapped(plotter, actor, other):
     plotter.remove_actor(actor)
     plotter.add_actor(other, reset_camera=False)
     return shown(plotter)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "change"),
-    [
-        pytest.param(*case, id=name, marks=[pytest.mark.slow] * (k % 6 > 0))
-        for k, (name, case) in enumerate(CHANGES.items())
-    ],
-)
-def test_changes_of_the_grid_show_where_add_volume_s_show(arguments, change):
-    seen = []
-    for method in ("add_volume", "add_vdi"):
-        plotter = pv.Plotter(window_size=WINDOW, off_screen=True)
-        plotter.camera_position = "xz"
-        grid = ramp()
-        getattr(plotter, method)(grid, **LOOKS, **arguments)
-        before = shown(plotter)
-        change(grid)
-        seen.append(np.abs(shown(plotter) - before).max())
-        plotter.close()
-    vtks, ours = seen
-    assert (ours > SEEN) == (vtks > SEEN), seen
 
 
 def test_a_replaced_property_takes_effect(plotter):

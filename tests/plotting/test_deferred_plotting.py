@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import UnsupportedError, VDIWarning
 
 pv = pytest.importorskip("pyvista")
 
@@ -70,26 +69,6 @@ def test_a_file_takes_a_look_and_its_picture_is_that_of_the_classified_vdi(
 
 
 @pytest.mark.parametrize(
-    ("asked", "says"),
-    [
-        ({"shade": True}, "shade=True needs the volume's gradients"),
-        ({"categories": True}, "categories are of single values"),
-        (
-            {"settings": pvdi.Settings(coverage="view")},
-            "coverage cannot be given with classification",
-        ),
-        ({"draw": "volume"}, "draw cannot be given with classification"),
-    ],
-)
-def test_it_is_refused_before_anything_is_generated(
-    default_runtime, plotter, monkeypatch, asked, says
-):
-    monkeypatch.setattr("pyvista_vdi.generation.deferred.generate_vdi", None)
-    with pytest.raises(UnsupportedError, match=says):
-        plotter.add_vdi(volume(), classification="deferred", **asked)
-
-
-@pytest.mark.parametrize(
     "as_series", [False, pytest.param(True, marks=pytest.mark.extension("series"))]
 )
 def test_what_is_shown_but_not_kept_is_warned_of_once(default_runtime, plotter, as_series):
@@ -105,18 +84,6 @@ def test_what_is_shown_but_not_kept_is_warned_of_once(default_runtime, plotter, 
     assert [str(each.message)[:43] for each in said] == [
         "the transfer function shows values outside "
     ]
-
-
-def test_shading_that_is_switched_on_later_is_refused_in_a_sentence(default_runtime, plotter):
-    actor = plotter.add_vdi(volume(), classification="deferred", show_scalar_bar=False)
-    before = seen(plotter)
-    actor.prop.shade = True
-    with pytest.warns(VDIWarning, match=r"cannot be drawn.*shading needs gradients"):
-        after = seen(plotter)
-    assert np.array_equal(before, after), "what was shown stays"
-    actor.prop.shade = False
-    actor.prop.GetScalarOpacity().AddPoint(100, 1.0)
-    assert np.abs(seen(plotter) - before).mean() > 0.2
 
 
 def test_picks_and_the_vdi_have_the_look_of_now(default_runtime, plotter):

@@ -5,14 +5,12 @@ from __future__ import annotations
 import pytest
 from plugin_scenes import LOOKS, soft_ball
 from settings import with_settings
-from vtk_sources import SIZE, executions, ready_source, some_property
+from vtk_sources import SIZE, ready_source, some_property
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, VDIWarning
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.options import QualityTarget
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
-from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image
-from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
 
 pytestmark = pytest.mark.gl
 
@@ -75,30 +73,3 @@ def test_a_source_makes_what_generate_makes():
     source.SetDial("fast")
     with pytest.raises(InvalidArgumentError, match="max_supersegments=5"):
         source.GetVDI()
-
-
-def test_an_equal_dial_changes_nothing_and_another_makes_another():
-    source = ready_source()
-    source.SetDial(target_ssim=0.9)
-    first, stamp = source.GetVDI(), source.GetMTime()
-    source.SetDial(target_ssim=0.9)
-    assert source.GetMTime() == stamp
-    source.SetDial(max_bytes=1000)
-    with pytest.warns(VDIWarning, match="max_bytes=1000 cannot be kept"):
-        assert source.GetVDI() is not first
-
-
-@pytest.mark.parametrize("asked", [{"max_bytes": 10**4}, {"target_ssim": 0.9999}])
-def test_what_is_behind_a_source_sees_the_window_that_was_chosen(asked, recwarn):
-    source = ready_source()
-    source.SetDial(**asked)
-    picture = VDIToImage()
-    picture.SetInputConnection(source.GetOutputPort())
-    picture.Update()
-    chosen = source.GetVDI().window_size
-    assert chosen != SIZE
-    assert source.GetOutputDataObject(0).GetDimensions() == (*chosen, 1)
-    assert vdi_from_image(source.GetOutputDataObject(0)).equals(source.GetVDI())
-    counted = executions(source)
-    picture.Update()
-    assert not counted

@@ -8,7 +8,7 @@ import pyvista as pv
 from plugin_scenes import LOOKS, soft_ball
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.plotting.editor import rows_of
 
 pytestmark = pytest.mark.gl
@@ -160,27 +160,3 @@ def test_the_histogram_counts_what_the_actor_draws(plotter):
     plotter.vdi.add_transfer_function_editor(plotter.add_vdi(kept, cmap="bone", **BARE))
     x, y = bars(plotter)
     assert (x[0], x[-1], len(x)) == (0, 200, 512)
-
-
-def test_what_has_no_transfer_function_is_refused_by_name(plotter):
-    ball = soft_ball(8)
-    edit = plotter.vdi.add_transfer_function_editor
-    vdi = pvdi.generate(ball, pvdi.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0)), (8, 8))
-    with pytest.raises(UnsupportedError, match="a VDI without its volume"):
-        edit(plotter.add_vdi(vdi, **BARE))
-    actor = plotter.add_volume(ball, **BARE)
-    with pytest.raises(InvalidArgumentTypeError, match="one of them where that is a list"):
-        edit([actor])
-    with pytest.raises(InvalidArgumentError, match="not in this plotter"):
-        pv.Plotter().vdi.add_transfer_function_editor(actor)
-    rgba = ball.copy()
-    rgba["v"] = np.zeros((ball.n_points, 4), np.uint8)
-    with pytest.raises(UnsupportedError, match="RGBA"):
-        edit(plotter.add_volume(rgba, **BARE))
-    assert plotter.renderer.get_charts() == []
-    editor = edit(actor)
-    for points in ([1, 2], [[1, 0], [1, 1]], [[0, 2]], [[0, np.nan]]):
-        with pytest.raises(InvalidArgumentError, match="pairs of a value and an opacity"):
-            editor.points = points
-    with pytest.raises(InvalidArgumentError, match="mean 'ct-bone'"):
-        editor.apply_cmap("ct-bones")

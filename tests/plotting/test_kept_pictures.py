@@ -78,21 +78,6 @@ def test_a_film_has_the_same_bits_in_every_run():
         np.testing.assert_array_equal(picture, other)
 
 
-def test_without_regeneration_no_vdi_is_made_off_screen():
-    assert set(film(np.linspace(0, 3, 20), regenerate="never")[1]) == {"volume"}
-
-
-@pytest.mark.parametrize(("bound", "drawn"), [(0.99999, "volume"), (0.5, "vdi")])
-def test_a_bound_that_was_given_is_what_does(plotter, bound, drawn):
-    how = pvdi.Settings(regenerate_below=bound)
-    actor = plotter.add_vdi(soft_ball(), settings=how, **LOOKS)
-    plotter.camera_position = VIEW
-    assert actor.vdi is not None
-    plotter.camera.Azimuth(3)
-    shown(plotter)
-    assert actor.status.drawn == drawn
-
-
 def _looked_around(plotter, add):
     add()
     for x, y in ((1, 0), (-1, 0.3)):
@@ -148,29 +133,3 @@ def test_a_picture_at_a_scale_has_the_detail_of_its_pixels(plotter):
         contrast.append(blocks.std(axis=(1, 3)).mean())
     assert contrast[0] == pytest.approx(contrast[1], rel=0.1)
     assert contrast[2] < contrast[1] / 2  # what lists can show of it
-
-
-@pytest.mark.parametrize("first", [0, 1])
-def test_volumes_that_overlap_are_right_in_whatever_order_they_came(first, plotter):
-    """The judge is a VDI of each at its own view, merged by depth."""
-
-    def scene(target, **options):
-        balls = [soft_ball(16), soft_ball(16)]
-        for place in (first, 1 - first):
-            actor = target.add_vdi(balls[place], name=f"{place}", **LOOKS, **options)
-            actor.position = (1.1 * place, 0.3 * place, 0.2)
-        target.camera_position = VIEW
-        shown(target)
-        target.camera.Azimuth(70)
-        target.camera.zoom(2)
-        return shown(target)
-
-    picture = scene(plotter)
-    assert {actor.status.drawn for actor in plotter.actors.values()} == {"vdi"}
-    judge = pv.Plotter(window_size=WINDOW)
-    scene(judge, draw="vdi")
-    for actor in judge.actors.values():
-        actor.regenerate()
-    # VDIs of this very view: but for those whose lists are wider than its pixels
-    assert alike(picture, shown(judge)) > 0.97
-    judge.close()

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import (
-    LOOKS,
     WINDOW,
-    add_judge,
     add_ours,
     assert_as_vtk,
     opaque_sphere,
@@ -23,30 +21,6 @@ pytestmark = pytest.mark.gl
 def ball_and_sphere(plotter, add):
     add(plotter, soft_ball())
     opaque_sphere(plotter)
-
-
-@pytest.mark.parametrize("lighting", ["light kit", "none"])
-def test_shaded_by_the_plotter_s_lights(lighting):
-    def scene(plotter, add):
-        add(plotter, soft_ball(), shade=True, ambient=0.2, specular=0.5, specular_power=15)
-        opaque_sphere(plotter)
-
-    assert_as_vtk(scene, lighting=lighting)
-
-
-@pytest.mark.parametrize("shade", [False, True])
-def test_rgba_scalars(shade):
-    ball = soft_ball()
-    x, y, z = (ball.points.T + 1) / 2 * 255
-    alpha = ball["v"] / ball["v"].max() * 255  # VTK looks a narrower range up wrongly
-    ball["v"] = np.column_stack([x, y, z, alpha]).astype(np.uint8)
-
-    def scene(plotter, add):
-        actor = add(plotter, ball, shade=shade)
-        if add is add_judge:  # add_volume leaves it at 1
-            actor.prop.SetScalarOpacityUnitDistance(3, LOOKS["opacity_unit_distance"])
-
-    assert_as_vtk(scene)
 
 
 @pytest.mark.parametrize("eye", ["left", "right"])

@@ -59,19 +59,6 @@ def test_vtks_files(name, tmp_path):
     np.testing.assert_allclose(volume.direction, turned() if name == "a.vti" else np.eye(3))
 
 
-def test_one_array_of_several_and_cells(tmp_path, default_runtime):
-    image = pv.ImageData(dimensions=(6, 5, 4))
-    image.cell_data["c"] = np.arange(image.n_cells, dtype=np.float32)
-    expected = image.cell_data_to_point_data().point_data["c"]
-    image.point_data["c"] = np.zeros(image.n_points)
-    image.set_active_scalars("c", preference="point")
-    image.save(tmp_path / "a.vti")
-    assert not read(tmp_path / "a.vti").array.any()
-    volume = read(tmp_path / "a.vti", scalars="c", preference="cell")
-    np.testing.assert_array_equal(volume.array.ravel(), expected)
-    assert [each.name for each in pvdi.list_volumes(tmp_path / "a.vti")] == ["c", "cell:c"]
-
-
 @pytest.mark.parametrize("name", ["a.vtk", "a.vti", "a.vtr"])
 def test_what_is_cut_off_is_refused(name, tmp_path, capfd):
     (rectilinear() if name == "a.vtr" else grid()).save(tmp_path / name)

@@ -1,12 +1,10 @@
-"""``pyvista.Volume`` and its mapper, method by method: as with add_volume, or refused by name."""
+"""``pyvista.Volume`` and its mapper, method by method: as with add_volume."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 import pyvista as pv
-
-from pyvista_vdi.errors import VDIError
 
 pytestmark = pytest.mark.gl
 
@@ -87,23 +85,6 @@ CHANGES = {
 }
 
 
-#: What a VDI cannot honour, and words of what is said.
-REFUSED = {
-    "blend_mode": (lambda a: setattr(a.mapper, "blend_mode", "maximum"), "composite blending"),
-    "volume's connection": (
-        lambda a: a.mapper.SetInputConnection(a.mapper.GetSource().GetInputConnection(0, 0)),
-        "is not a VDI.*VDISource",
-    ),
-    "sample distance": (lambda a: a.mapper.SetSampleDistance(-1.0), "sample_distance.*got -1.0"),
-    "mask": (lambda a: a.mapper.SetMaskInput(image()), "set masked voxels"),
-    "scattering": (lambda a: a.mapper.SetVolumetricScatteringBlending(0.5), "ambient_occlusion"),
-    "another mapper": (
-        lambda a: setattr(a, "mapper", pv.plotting.mapper.SmartVolumeMapper()),
-        "needs a VDIMapper; got SmartVolumeMapper",
-    ),
-}
-
-
 class Shown:
     """A plotter that shows the image one way, and what it shows after something was done."""
 
@@ -139,13 +120,3 @@ def test_a_change_is_seen_as_with_add_volume(closed, name):
         del kept
     # Seen: up to .28; without what is done 2 and more
     assert np.abs(pictures[0] - pictures[1]).mean() < 0.6
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_a_vdi_cannot_honour_is_refused_by_name(closed, name):
-    change, words = REFUSED[name]
-    shown = Shown("add_vdi")
-    before = shown.picture()
-    with pytest.raises(VDIError, match=words):
-        change(shown.actor)
-    np.testing.assert_array_equal(shown.picture(), before)

@@ -10,7 +10,6 @@ import pyvista as pv
 from plugin_scenes import LOOKS, WINDOW, shown, soft_ball
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import MissingDependencyError
 
 pytestmark = pytest.mark.gl
 
@@ -86,12 +85,6 @@ def test_a_camera_that_was_set_stays_and_to_pyvista_goes_back(plotter):
     assert np.abs(shown(plotter) / 255 - expected).max() <= 1 / 255
 
 
-def test_without_pyvista_its_extra_is_named(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "pyvista", None)
-    with pytest.raises(MissingDependencyError, match=r"pyvista-vdi\[plot\]"):
-        OWN.to_pyvista()
-
-
 # actor.vdi, whenever it is asked for
 
 
@@ -110,20 +103,6 @@ def test_before_the_first_picture_it_is_of_the_view_that_this_has():
     np.testing.assert_allclose(made.camera.position, camera.position)
     assert made.picture_size == plotter.renderers[1].GetSize()
     plotter.close()
-
-
-def test_what_no_renderer_shows_has_no_view():
-    for deferred in ({}, {"classification": "deferred"}):
-        plotter = new_plotter()
-        actor = plotter.add_vdi(soft_ball(), **LOOKS, **deferred)
-        plotter.close()
-        assert actor.vdi is actor.deferred is None
-
-
-# Light
-
-
-# Values are made with the first picture
 
 
 # What is held

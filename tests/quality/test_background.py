@@ -81,25 +81,6 @@ def test_the_same_bytes(runtime, background, dtype, parallel):
     assert not threads(), "it ends by itself"
 
 
-def test_what_is_made_is_taken_once_and_another_job_replaces_it(runtime, background):
-    assert (background.running, background.progress, background.take()) == (False, None, None)
-    first, second = Held(runtime, "first"), Held(runtime, "second")
-    background.put(first.job)
-    assert first.begun.wait(PATIENCE)
-    assert (background.running, background.progress, background.take()) == (True, 0.4, None)
-    background.put(second.job)
-    assert first.job.cancelled.is_set()
-    assert background.job.key == "second"
-    for held in (first, second):
-        held.go_on.set()
-    assert taken(background) == "second"
-    assert (background.job, background.take()) == (None, None)
-    background.put(second.job)
-    background.clear()
-    background.join()
-    assert background.take() is None
-
-
 def test_an_error_is_raised_once(runtime, background):
     background.put(Job(lambda *_: [][0], runtime))
     with pytest.raises(IndexError):

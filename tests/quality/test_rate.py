@@ -11,8 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from pyvista_vdi.quality.costs import Costs, rise
-from pyvista_vdi.quality.rate import FLOOR, FrameRate, Pace, reduced
+from pyvista_vdi.quality.rate import FLOOR, FrameRate
 
 FULL, TARGET, THRESHOLD = 1280 * 720, 30.0, 0.1
 PERIOD = 1 / TARGET
@@ -67,36 +66,3 @@ def test_full_where_that_fits_and_the_floor_where_nothing_does():
     chosen, _, _ = run(lambda k: (2 if k < 50 else 0.5) * (PERIOD - 4e-3) / FULL)
     assert (chosen[10:50] < FULL).all()
     assert (chosen[70:] == FULL).all()
-
-
-# A window
-
-
-def frame(pace, seconds, *, full=(100, 100), share=None, samples=0, beside=0.01):
-    """Draw a frame whose full image takes so many seconds; returns its share of the pixels."""
-    pace.began(samples)
-    if share is None:
-        share = pace.share(TARGET, math.prod(full), FLOOR)
-    size = reduced(full, share)
-    work = seconds * math.prod(size) / math.prod(full)
-    pace.drawn(size, full, work)
-    pace.ended(work + beside, True)
-    return share
-
-
-def test_frames_are_late_where_their_rays_are():
-    pace = Pace()
-    frame(pace, 0.001, share=1.0)
-    assert pace.late(0.03, TARGET)
-    assert not pace.late(0.01, TARGET)
-    frame(pace, 0.001, share=1.0, beside=0.05)
-    assert not pace.late(0.005, TARGET), "an empty scene misses the rate"
-
-
-def test_costs_are_known_as_if_at_the_vdis_own_view():
-    costs = Costs().took("vdi", 30.0, 1000, 0.024).took("volume", 30.0, 1000, 0.01)
-    assert costs.vdi == pytest.approx(1e-6)
-    assert costs.volume == pytest.approx(1e-5)
-    assert costs.took("vdi", 0.0, 1000, 0.002).vdi == pytest.approx(1.4e-6)
-    assert costs.took("vdi", 0.0, 0, 0.002) == costs
-    assert [rise(angle) for angle in (0, 5, 180)] == [1.0, 6.4, 40.0]

@@ -122,14 +122,6 @@ def test_what_contradicts_or_is_out_of_range_is_refused(default_runtime, asked, 
         generated(default_runtime, **asked)
 
 
-@pytest.mark.parametrize("name", PRESETS)
-def test_a_name_is_looked_up(default_runtime, name):
-    vdi, (rung, ssim) = generated(default_runtime, quality=name), PRESETS[name]
-    assert rung_of(vdi) == rung
-    assert vdi.metadata["dial"]["predicted"] == {"ssim": ssim}
-    assert f"predicted SSIM {ssim:.3f} at 30" in describe(vdi.metadata)
-
-
 def test_metadata_say_what_was_asked_chosen_and_predicted(default_runtime, tmp_path):
     vdi = generated(default_runtime, target_ssim=0.9, max_bytes=10**7)
     found = vdi.metadata["dial"]

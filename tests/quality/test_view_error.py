@@ -18,7 +18,6 @@ from pyvista_vdi.quality.view_error import (
     TILES,
     ViewErrorEstimator,
     angle_from_generating_view,
-    contrast_ratio,
     magnification,
 )
 
@@ -115,18 +114,6 @@ def test_a_volume_out_of_view_has_no_error(runtime):
     for camera in (behind, VIEW.replace(window_center=(9, 0)), parallel):
         found = estimator.estimate(vdi, camera, WINDOW)
         assert (found.ssim, found.tiles) == (1, 0)
-
-
-def test_contrast_is_of_detail_within_blocks_and_weighted():
-    rng = np.random.default_rng(1)
-    sharp = np.float32(rng.random((2, 24, 24, 4)))
-    sharp[..., 3] = 1
-    coarse = sharp[:, ::4, ::4].repeat(4, axis=1).repeat(4, axis=2)
-    assert contrast_ratio(list(coarse), list(sharp), np.ones(2)) == 0
-    half = [0.5 * sharp[0] + 0.5 * coarse[0], sharp[1]]
-    assert contrast_ratio(half, list(sharp), np.ones(2)) == pytest.approx(0.75, abs=0.01)
-    assert contrast_ratio(half, list(sharp), np.array([1.0, 3.0])) == pytest.approx(0.875, abs=0.01)
-    assert contrast_ratio(list(coarse), list(coarse), np.ones(2)) == 1
 
 
 BOUNDS = (-1, 1, -1, 1, -1, 1)

@@ -94,23 +94,11 @@ PAGE = """<!doctype html><meta charset="utf-8"><style>body {{ margin: 0 }}</styl
 <body></body><script type="module">
 import "./element.js";
 {script}
-let shown = [];
-window.show = async (markup, data) => {{
-  if (!data || shown[0] !== markup || shown[1] !== data) {{
-    shown = [markup, data];
-    document.body.innerHTML = markup;
-    window.viewer = document.querySelector("vdi-viewer");
-    for (const name of ["camerachange", "framedrawn", "vditime", "error"]) {{
-      viewer?.addEventListener(name, (event) => heard.push([name, event.detail]));
-    }}
-    window.heard = [];
-    if (data) await viewer.load(bytesOf(data));
-    return;
-  }}
-  window.heard = [];
-  viewer.clippingPlanes = [];
-  viewer.removeAttribute("background");
-  viewer.resetCamera();
+window.show = (markup) => {{
+  document.body.innerHTML = markup;
+  window.viewer = document.querySelector("vdi-viewer");
+  window.errors = [];
+  viewer?.addEventListener("error", ({{ detail }}) => errors.push(detail.message));
 }};
 </script>"""
 
@@ -190,8 +178,8 @@ def picture(page, size, viewer="viewer"):
     return array_of(text, np.uint8).reshape(*shape, 4)
 
 
-def assert_axe_finds_nothing(page, within="document"):
-    """Hold a page, or an element of it, to axe-core's rules of accessibility.
+def assert_axe_finds_nothing(page):
+    """Hold a page to axe-core's rules of accessibility.
 
     ``PYVISTA_VDI_AXE`` names its axe.min.js: ``npm install axe-core``.
     """
@@ -199,16 +187,13 @@ def assert_axe_finds_nothing(page, within="document"):
     if axe is None:
         pytest.skip("PYVISTA_VDI_AXE names no axe.min.js: npm install axe-core")
     page.evaluate(Path(axe).read_text(encoding="utf-8"))
-    found = page.evaluate(f"axe.run({within})")
+    found = page.evaluate("axe.run(document)")
     assert [each["id"] for each in found["violations"]] == []
     assert len(found["passes"]) > 10
 
 
 class Page:
-    """A page with a viewer; ``page`` is Playwright's.
-
-    ``asked`` has the names of the files that were asked for; ``urls`` has what else was asked for.
-    """
+    """A page with a viewer; ``page`` is Playwright's, and ``urls`` has what was asked for."""
 
     def __init__(self, context):
         self.page = context.new_page()
@@ -221,7 +206,7 @@ class Page:
 
     def begin_anew(self, files=None, expected=None):
         self.files, self.expected = dict(files or {}), expected
-        self.asked, self.urls, self.complaints = [], [], []
+        self.urls, self.complaints = [], []
 
     def hear(self, message):
         # Calls that WebGL refuses are warnings to Chromium
@@ -235,7 +220,6 @@ class Page:
     def answer(self, route):
         name = route.request.url.removeprefix(SITE).partition("?")[0]
         content = self.files.get(name)
-        self.asked.append(name)
         module = resources.files("pyvista_vdi.extensions.web") / "viewer" / name
         if content is None and name.endswith(".js") and module.is_file():
             content = module.read_text(encoding="utf-8")
@@ -305,8 +289,7 @@ def open_page(chromium, shared_pages):
     ``before`` runs before anything else, ``script`` before there is a viewer. What the page
     complains of fails the test, but for what ``expected`` (a pattern) is found in. Without
     ``options`` of Playwright's context a page of the same scripts is shared by the tests of a file,
-    each of which has a viewer of its own; but a viewer that shows ``data``, the bytes of a file, is
-    shared as well: a test leaves it as it was, but for its view, its planes and its background.
+    each of which has a viewer of its own.
     """
     contexts, pages, used = [], [], []
 
@@ -319,7 +302,6 @@ def open_page(chromium, shared_pages):
         size=(320, 180),
         *,
         attributes="",
-        data=None,
         script="",
         before="",
         files=None,
@@ -340,7 +322,7 @@ def open_page(chromium, shared_pages):
             else:
                 contexts.append(page.page.context)
         if shared:
-            used.append((page, data))
+            used.append(page)
         page.begin_anew(files, expected)
         pages.append((page, url))
         if url is None and name is None:
@@ -349,7 +331,7 @@ def open_page(chromium, shared_pages):
                 page.page.goto(SITE + "page.html")
                 page.wait_for("!!window.show")
             markup = VIEWER.format(attributes=attributes, width=size[0], height=size[1])
-            page.evaluate("(given) => show(...given)", [markup, data and in_base64(data)])
+            page.evaluate("(markup) => show(markup)", markup)
         else:
             page.page.goto(url or SITE + name)
             if options.get("java_script_enabled", True):
@@ -357,9 +339,8 @@ def open_page(chromium, shared_pages):
         return page
 
     yield open_page
-    for page, data in used:
-        if not data:
-            page.evaluate("show('')")
+    for page in used:
+        page.evaluate("show('')")
     for context in contexts:
         context.close()
     for page, url in pages:

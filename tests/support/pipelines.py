@@ -12,8 +12,8 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtk_to_numpy,
     vtkColorTransferFunction,
     vtkDataObject,
-    vtkGPUVolumeRayCastMapper,
     vtkImageData,
+    vtkOpenGLGPUVolumeRayCastMapper,
     vtkPiecewiseFunction,
     vtkRenderer,
     vtkRenderWindow,
@@ -128,7 +128,8 @@ class Scene:
         self.way, self.renderer, self.window = way, vtkRenderer(), vtkRenderWindow()
         self.property = prop or property_of()
         if way == "vtk":
-            self.first = self.mapper = vtkGPUVolumeRayCastMapper()
+            # By its OpenGL class, whose module is what gives VTK's windows their OpenGL
+            self.first = self.mapper = vtkOpenGLGPUVolumeRayCastMapper()
             self.mapper.SetAutoAdjustSampleDistances(0)
             self.mapper.SetSampleDistance(0.2)
             self.actor = vtkVolume()

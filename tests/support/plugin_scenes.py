@@ -112,11 +112,10 @@ def assert_as_vtk(
     scene: Callable[[pv.Plotter, Callable[..., Any]], Any],
     shot: Callable[[pv.Plotter], Any] | None = None,
     *,
-    tolerance: int = TOLERANCE,
     strays: int = 0,
     **options: Any,
 ) -> None:
-    """Our picture of a scene is VTK's, within ``tolerance`` of 255, and shows the volume.
+    """Our picture of a scene is VTK's, within ``TOLERANCE`` of 255, and shows the volume.
 
     ``strays`` pixels may be further off, where the opaque scene itself differs.
     """
@@ -127,7 +126,7 @@ def assert_as_vtk(
     assert ours.shape == judge.shape
     difference = np.abs(ours - judge).max(axis=-1)
     y, x = np.unravel_index(difference.argmax(), difference.shape)
-    assert np.count_nonzero(difference > tolerance) <= strays, (
+    assert np.count_nonzero(difference > TOLERANCE) <= strays, (
         f"pixel x={x}, y={y} (top row first): ours {ours[y, x]}, VTK's {judge[y, x]}; "
-        f"{np.count_nonzero(difference > tolerance)} pixels beyond {tolerance}"
+        f"{np.count_nonzero(difference > TOLERANCE)} pixels beyond {TOLERANCE}"
     )

@@ -108,19 +108,19 @@ def turned(plotter, degrees, rate=STILL):
     return frame(plotter, rate)
 
 
-def frames(plotter, count, rate=STILL):
+def frames(plotter, count):
     """Draw frames of the same view."""
     for _ in range(count):
-        frame(plotter, rate)
+        frame(plotter)
 
 
-def frames_until(plotter, happened, rate=STILL):
-    """Draw frames, by default at rest, until something is so; all pictures."""
+def frames_until(plotter, happened):
+    """Draw frames at rest until something is so; all pictures."""
     pictures = []
     end = time.monotonic() + LONG
     while not happened():
         assert time.monotonic() < end, "it has not happened"
-        pictures.append(frame(plotter, rate))
+        pictures.append(frame(plotter))
         time.sleep(0.005)
     return pictures
 
@@ -141,9 +141,6 @@ def picture_of(thing, plotter, **options):
     """What another plotter shows of a VDI or a volume, from this one's view, waiting for it."""
     other = pv.Plotter(window_size=plotter.window_size)
     other.add_vdi(thing, show_scalar_bar=False, regenerate="never", **options)
-    if plotter.render_window.GetStereoRender():
-        other.render_window.SetStereoType(plotter.render_window.GetStereoType())
-        other.render_window.StereoRenderOn()
     other.camera = plotter.camera.copy()
     other.show(auto_close=False)
     picture = frame(other)
@@ -158,6 +155,6 @@ def coarse(plotter, **options):
     return actor
 
 
-def small_vdi(size=(60, 50), **options):
+def small_vdi():
     camera = pvdi.Camera((5, 4, 3), (0, 0, 0), (0, 0, 1))
-    return pvdi.generate(soft_ball(12), camera, size, **CLASSIFICATION, **options)
+    return pvdi.generate(soft_ball(12), camera, (60, 50), **CLASSIFICATION)

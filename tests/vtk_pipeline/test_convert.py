@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from pyvista_vdi.errors import (
     InvalidArgumentError,
-    InvalidVolumeError,
     UnsupportedError,
     VDIWarning,
 )
@@ -53,22 +52,6 @@ def test_points_are_where_vtk_has_them_and_memory_is_shared():
     assert volume.default_unit_distance == pytest.approx(
         grid.length / (np.mean(grid.dimensions) - 1), rel=1e-12
     )
-
-
-@pytest.mark.parametrize(
-    ("grid", "error", "message"),
-    [
-        (pv.ImageData(dimensions=(4, 3, 5)), InvalidVolumeError, "there is nothing to render"),
-        (some_grid(v=np.zeros((60, 3))), UnsupportedError, "3 components.*one scalar per point"),
-        (some_grid(v=np.zeros((60, 4), np.uint16)), UnsupportedError, "4 components.*or from RGBA"),
-        (some_grid().cast_to_structured_grid(), UnsupportedError, "uniform grid.*resample a"),
-        (pv.Sphere(), UnsupportedError, "not a uniform grid.*voxelise a surface"),
-        (pv.MultiBlock([some_grid()]), UnsupportedError, "not a uniform grid.*one by one"),
-    ],
-)
-def test_what_is_no_volume_is_refused_with_the_remedy(grid, error, message):
-    with pytest.raises(error, match=message):
-        volume_from_vtk(grid)
 
 
 def function_of(*nodes):

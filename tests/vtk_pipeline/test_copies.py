@@ -7,11 +7,8 @@ import pytest
 from pipelines import Scene, image_of, is_blank, values
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.vtk_pipeline.vtk import (
-    vtkGPUVolumeRayCastMapper,
     vtkPlane,
-    vtkVolume,
 )
 
 pytestmark = pytest.mark.gl
@@ -67,13 +64,3 @@ def test_a_copy_draws_what_the_original_draws(scene, copied):
     scene.renderer.RemoveVolume(copy)
     copy.GetMapper().RemoveAllClippingPlanes()  # none of the original's
     assert scene.mapper.GetClippingPlanes().GetNumberOfItems() == 1
-
-
-def test_copies_of_volumes_that_are_no_vdis_are_refused(scene):
-    volume = vtkVolume()
-    volume.SetMapper(vtkGPUVolumeRayCastMapper())
-    with pytest.raises(InvalidArgumentError, match="needs a VDIMapper; got"):
-        scene.actor.ShallowCopy(volume)
-    with pytest.raises(InvalidArgumentError, match="copies a VDIMapper; got .*VDISource"):
-        scene.mapper.ShallowCopy(volume.GetMapper())
-    assert not is_blank(scene.picture())

@@ -1,4 +1,4 @@
-"""Values that are kept, in a VTK pipeline: a source of them, their form, a picture's property."""
+"""Values that are kept, in a VTK pipeline: a source of them, a picture's property."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from settings import with_settings
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.vtk_pipeline import VDIToImage, vdi_from_image, vdi_to_image
+from pyvista_vdi.vtk_pipeline import VDIToImage
 from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkVolumeProperty
 
 CAMERA = pvdi.Camera((0, -6, 2), (0, 0, 0), (0, 0, 1))
@@ -63,19 +63,3 @@ def test_a_source_keeps_values_and_a_property_classifies_them(default_runtime, m
     keeping.SetVolumeProperty(prop)  # which decides nothing here
     np.testing.assert_array_equal(pixels(picture), shown_by(prop, kept))
     assert np.abs(pixels(picture) - first).max() > 0.1
-
-
-def test_form_files_and_plotters_keep_values(default_runtime, tmp_path):
-    pv = pytest.importorskip("pyvista")
-    kept = source().GetVDI().with_precision("8-byte")
-    again = vdi_from_image(vdi_to_image(kept))
-    assert again.about == kept.about
-    for name in ("offsets", "front", "back", "mean", "spread", "share", "steps"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(kept, name), err_msg=name)
-    image = pv.read(kept.save(tmp_path / "kept.vdi"))
-    image.save(tmp_path / "again.vdi")
-    assert pvdi.read(tmp_path / "again.vdi").equals(again)
-    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
-    actor = plotter.add_vdi(image, cmap="bone", clim=(30, 220), show_scalar_bar=False)
-    assert actor.mapper.driver.input.deferred.equals(again)
-    plotter.close()

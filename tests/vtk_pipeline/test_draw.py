@@ -7,9 +7,7 @@ import pytest
 import pyvista as pv
 from plugin_scenes import LOOKS, add_judge, shown, soft_ball
 from skimage.metrics import structural_similarity
-from watched_windows import WINDOW, frame, small_vdi
-
-from pyvista_vdi.errors import UnsupportedError
+from watched_windows import WINDOW
 
 pytestmark = pytest.mark.gl
 
@@ -46,27 +44,6 @@ def test_the_volume_is_drawn_as_by_vtk_and_no_vdi_is_made(plotter):
     volume["v"][:] = 0.5 * volume["v"]
     assert np.abs(shown(plotter) - turned).max() > 8
     assert actor.mapper.GetVDI() is None
-
-
-def test_volumes_that_overlap_are_drawn_by_their_vdis(plotter):
-    actor = plotter.add_vdi(soft_ball(), **LOOKS)
-    plotter.show(auto_close=False)
-    assert actor.status.drawn == "volume"
-    other = plotter.add_vdi(soft_ball(12), **LOOKS)
-    for each in (actor, other):
-        each.mapper.SetInteractiveOffScreen(True)
-    plotter.camera.azimuth = 40
-    frame(plotter)
-    frame(plotter)
-    assert {actor.status.drawn, other.status.drawn} == {"vdi"}
-
-
-def test_a_vdi_without_its_volume_is_all_there_is(plotter):
-    vdi = small_vdi()
-    with pytest.raises(UnsupportedError, match="draw='volume' draws the volume"):
-        plotter.add_vdi(vdi, draw="volume")
-    plotter.add_vdi(vdi, draw="auto")
-    plotter.show(auto_close=False)
 
 
 def test_fewer_rays_as_by_vtks_mappers(plotter):

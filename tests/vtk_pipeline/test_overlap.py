@@ -15,7 +15,6 @@ from plugin_scenes import (
 )
 from skimage.metrics import structural_similarity
 
-from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkMultiVolume,
     vtkOpenGLGPUVolumeRayCastMapper,
@@ -54,14 +53,6 @@ def draw(order, scene=None):
     return image
 
 
-def two_balls():
-    """A plotter of two, which has drawn nothing yet, and the actors."""
-    plotter = new_plotter()
-    actors = [add_ball(plotter, which) for which in (0, 1)]
-    plotter.camera_position = CAMERA
-    return plotter, actors
-
-
 def with_sphere(plotter, actors):
     opaque_sphere(plotter)
 
@@ -75,10 +66,6 @@ def one_cropped(plotter, actors):
     actors[1].mapper.SetCroppingRegionPlanes(-0.5, 0.1, -0.3, 0.4, -0.2, 0.9)
     actors[1].mapper.SetCroppingRegionFlagsToFence()
     actors[1].mapper.CroppingOn()
-
-
-def one_inverted(plotter, actors):
-    actors[1].mapper.SetFinalColorWindow(-1.0)
 
 
 def eye_in_both(plotter, actors):
@@ -97,11 +84,6 @@ def test_the_order_of_adding_changes_nothing(scene):
     assert np.array_equal(first, second)
     alone = draw((1,), lambda plotter, actors: scene(plotter, {0: None, **actors}))
     assert np.abs(first - alone).max() > 40  # the other one is there
-
-
-def test_another_window_or_level_of_one_is_refused():
-    with pytest.warns(VDIWarning, match="overlap .*SetFinalColorWindow"):
-        draw((0, 1), one_inverted)
 
 
 def multi_volume():
@@ -146,26 +128,6 @@ def test_as_vtk_marches_both_volumes_together():
     )
     assert ssim >= 0.99
     assert np.abs(judge - ours).max() <= TOLERANCE
-
-
-def test_changes_are_seen_at_once():
-    plotter, actors = two_balls()
-    both = shown(plotter)
-    actors[0].SetVisibility(False)
-    hidden = shown(plotter)
-    actors[0].SetVisibility(True)
-    assert np.array_equal(shown(plotter), both)
-    # VDIs of their own views, so only nearly what is drawn anew
-    assert np.abs(hidden - draw((1,))).max() <= 2
-    plotter.remove_actor(actors[0])
-    assert np.array_equal(shown(plotter), hidden)
-    actors[0] = add_ball(plotter, 0)
-    assert np.abs(shown(plotter) - both).max() <= 2
-    actors[1].user_matrix = np.eye(4)
-    moved = shown(plotter)
-    assert np.abs(moved - both).max() > 40
-    actors[0].mapper.lookup_table.cmap = "bone"
-    assert np.abs(shown(plotter) - moved).max() > 20
 
 
 @pytest.mark.usefixtures("no_leaks")

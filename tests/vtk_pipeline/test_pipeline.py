@@ -11,7 +11,7 @@ from vtk_sources import ready_source, some_property
 from watched_windows import on_screen
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidVDIError, VDIWarning
+from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkActor,
@@ -116,16 +116,6 @@ def test_one_actor_in_two_windows_and_two_viewports():
     halves = picture(other)
     np.testing.assert_array_equal(halves[:, :120], alone)
     assert np.abs(halves[:, 120:] - alone).max() > 40
-
-
-def test_a_plain_volume_before_the_mapper_is_told_what_to_do():
-    mapper = pvdi.VDIMapper()
-    mapper.SetVDI(vdi_of_one_list())
-    volume = vtkVolume()
-    volume.SetMapper(mapper)
-    window = window_with(scene_of(volume))
-    with pytest.warns(VDIWarning, match="use VDIActor in place of vtkVolume"):
-        window.Render()
 
 
 def test_mapper_takes_vdis_and_their_images_and_no_volumes():

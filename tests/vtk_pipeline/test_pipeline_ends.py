@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from extension_marks import cases
-from plugin_scenes import soft_ball, vdi_of_one_list
-from vtk_sources import ready_source
+from plugin_scenes import soft_ball
 
 import pyvista_vdi as pvdi
-from pyvista_vdi import errors
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.vtk_pipeline import (
     VDIReader,
@@ -22,7 +20,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtk_to_numpy,
     vtkCamera,
     vtkStreamingDemandDrivenPipeline,
-    vtkXMLImageDataReader,
 )
 
 
@@ -59,32 +56,6 @@ def extent(algorithm):
     return algorithm.GetOutputInformation(0).Get(key)
 
 
-@pytest.mark.parametrize("kind", [VDIToImage, VDIWriter, pvdi.VDISource])
-def test_what_has_no_input_says_so(kind, expected_messages, tmp_path):
-    end = kind()
-    ask, error = end.Update, errors.InvalidVDIError
-    if kind is VDIWriter:
-        end.SetFileName(str(tmp_path / "a.vdi"))
-        ask = end.Write
-    elif kind is pvdi.VDISource:
-        end, error = ready_source(InputDataObject=None), errors.InvalidVolumeError
-        ask = end.GetVDI
-    with pytest.raises(error, match=rf"{kind.__name__} has no input"):
-        ask()
-    if kind is pvdi.VDISource:  # of what was there before, nothing is left
-        end.SetInputDataObject(soft_ball(4))
-        end.GetVDI()
-    reader = vtkXMLImageDataReader()
-    reader.SetFileName(str(tmp_path / "none.vti"))
-    end.SetInputConnection(reader.GetOutputPort())
-    with pytest.raises(error, match=r"VTK's output window says why"):
-        ask()
-    with pytest.raises(error, match=r"VTK's output window says why"):
-        (ask if kind is VDIWriter else end.Update)()
-    assert "none.vti" in expected_messages.GetOutput()
-    assert not list(tmp_path.iterdir())
-
-
 def test_picture_is_what_render_returns(picture, vdi):
     image = picture.GetImage()
     expected = pvdi.render(vdi, vdi.camera)
@@ -108,19 +79,6 @@ def test_picture_is_what_render_returns(picture, vdi):
     np.testing.assert_array_equal(pixels(picture.GetImage()), pvdi.render(vdi, camera))
 
 
-def test_picture_is_made_again_only_if_something_changed(picture):
-    image = picture.GetInputDataObject(0, 0)
-    made = picture.GetImage().GetMTime()
-    picture.SetAzimuth(0)
-    assert picture.GetImage().GetMTime() == made
-    picture.SetAzimuth(5)
-    assert picture.GetImage().GetMTime() > made
-    other = vdi_of_one_list()
-    image.ShallowCopy(vdi_to_image(other))
-    turned = pvdi.render(other, other.camera.azimuth(5))
-    np.testing.assert_array_equal(pixels(picture.GetImage()), turned)
-
-
 @pytest.mark.parametrize("suffix", cases(".vdi", ".exr"))
 def test_files_keep_every_bit(vdi, suffix, tmp_path):
     path = tmp_path / f"ball{suffix}"
@@ -135,20 +93,3 @@ def test_files_keep_every_bit(vdi, suffix, tmp_path):
     found = vdi_from_image(reader.GetOutputDataObject(0))
     assert found.equals(vdi if suffix == ".vdi" else pvdi.read(path))
     assert reader.GetFileName() == writer.GetFileName() == str(path)
-
-
-def test_files_are_written_as_asked_for(vdi, tmp_path):
-    writer = VDIWriter()
-    writer.SetInputData(vdi_to_image(vdi))
-    writer.SetFileName(tmp_path / "a.vdi")
-    assert (writer.GetPrecision(), writer.GetCompression()) == (None, None)
-    writer.SetPrecision("8-byte")
-    writer.SetCompression("zstd")
-    writer.Write()
-    vdi.save(tmp_path / "b.vdi", precision="8-byte", compression="zstd")
-    assert (tmp_path / "a.vdi").read_bytes() == (tmp_path / "b.vdi").read_bytes()
-    with pytest.raises(errors.InvalidArgumentError, match="precision must be .*'4-byte'"):
-        writer.SetPrecision("4-byte")
-    writer.SetCompression("zip")
-    with pytest.raises(errors.InvalidArgumentError, match="compression of .*'zip'"):
-        writer.Write()

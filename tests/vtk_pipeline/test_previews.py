@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plugin_scenes import opaque_sphere, soft_ball
+from plugin_scenes import opaque_sphere
 from watched_windows import (
     MOVING,
     WINDOW,
@@ -20,7 +20,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtk_to_numpy,
     vtkGenericRenderWindowInteractor,
     vtkInteractorStyleTrackballCamera,
-    vtkPlane,
     vtkRenderer,
     vtkRenderWindow,
     vtkWindowToImageFilter,
@@ -52,40 +51,6 @@ def test_preview_while_the_rate_is_high_and_full_in_the_next_frame(plotter, coar
     assert np.abs(rest - preview).mean() < 2
     plotter.camera.Azimuth(-20)
     np.testing.assert_array_equal(frame(plotter), full)
-
-
-def clip(mapper):
-    plane = vtkPlane()
-    plane.SetNormal(1, 0.3, 0.1)
-    mapper.AddClippingPlane(plane)
-
-
-def crop(mapper):
-    mapper.SetCropping(1)
-    mapper.SetCroppingRegionPlanes(-0.4, 0.3, -0.2, 0.5, -0.4, 0.2)
-    mapper.SetCroppingRegionFlagsToCross()
-
-
-@pytest.mark.parametrize(
-    ("cut", "undo", "share"),
-    # Shares of what a whole ball would be off by. Cropped, lists begin and end in the middle
-    [
-        (clip, lambda mapper: mapper.RemoveAllClippingPlanes(), 0.2),
-        (crop, lambda mapper: mapper.CroppingOff(), 1 / 3),
-    ],
-    ids=["clipping", "cropping"],
-)
-def test_previews_are_cut_as_full_frames_are(plotter, coarsest, cut, undo, share):
-    actor = watched(plotter, soft_ball(48))
-    cut(actor.mapper)
-    preview = turned(plotter, 1, MOVING)
-    assert actor.status.mode == "preview"
-    full = frame(plotter)
-    assert actor.status.mode == "full"
-    undo(actor.mapper)
-    whole = frame(plotter)
-    assert np.abs(whole - full).max() > 40
-    assert np.abs(preview - full).mean() < share * np.abs(whole - full).mean()
 
 
 def test_off_screen_windows_and_pictures_are_always_full(plotter, coarsest):
@@ -153,27 +118,3 @@ def test_a_style_starts_and_ends_an_interaction(coarsest):
     assert actor.status.mode == "full", "the frame in which the button is released"
     assert actor.status.angle > 1
     assert np.abs(on_screen(window) - before).max() > 8
-
-
-def test_vtks_switches_turn_previews_off_and_bound_them(plotter, coarsest):
-    actor = watched(plotter)
-    mapper = actor.mapper
-    assert mapper.GetAutoAdjustSampleDistances()
-
-    def share():
-        turned(plotter, 3, MOVING)
-        return actor.status.share
-
-    assert share() < 0.1
-    mapper.AutoAdjustSampleDistancesOff()
-    assert share() == 1.0
-    mapper.AutoAdjustSampleDistancesOn()
-    mapper.SetMaximumImageSampleDistance(2.0)
-    assert share() == pytest.approx(0.25, abs=0.01)
-    mapper.SetMaximumImageSampleDistance(10.0)
-    assert share() < 0.05
-    mapper.SetTargetFrameRate(0)
-    assert share() == 1.0
-    mapper.SetTargetFrameRate(None)
-    assert mapper.GetTargetFrameRate() is None
-    assert share() < 0.05

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from vtk_sources import camera_at
 from watched_windows import on_screen
 
 import pyvista_vdi as pvdi
@@ -23,7 +22,7 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkVolumeProperty,
 )
 
-FLOAT_MAX, DOUBLE_MAX = np.finfo(np.float32).max, np.finfo(np.float64).max
+DOUBLE_MAX = np.finfo(np.float64).max
 SIZE = (96, 80)
 #: Voxels; a peak of some scalars is thinner than one.
 STEP = 0.05
@@ -188,36 +187,6 @@ def test_tables_are_getcolor_s(space, beyond, lone):
         # LabCIEDE2000 goes from byte to byte, and GetColor has a node itself
         away = 0.03 if space == 4 else 2e-3
         np.testing.assert_allclose(table.colors[int(scalar - low)], expected, atol=away)
-
-
-def labels_of(n, dtype):
-    """Balls of labels, the least and the largest among them."""
-    rng, values = np.random.default_rng(3), np.zeros((24, 24, 24), dtype)
-    z, y, x = np.mgrid[:24, :24, :24]
-    for k in range(40):
-        (a, b, c), r = rng.uniform(4, 20, 3), rng.uniform(2, 5)
-        inside = (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2 < r * r
-        values[inside] = {0: 1, 1: n - 1}.get(k, rng.integers(1, n))
-    return pvdi.Volume(values)
-
-
-@pytest.mark.parametrize(
-    ("dtype", "steps", "n"), [(np.uint16, True, 4097), (np.float32, False, 5023)]
-)
-def test_each_of_thousands_of_labels_has_its_colour(dtype, steps, n):
-    colors = np.random.default_rng(5).integers(0, 256, (n, 3)) / 255
-    beside = (-0.4, 0.4) if steps else (0,)
-    nodes = [(label + d, *colors[label]) for label in range(n) for d in beside]
-    prop = property_of(
-        colors_of((-1e6, 0, 0, 0), *nodes, (1e6, 1, 1, 1)), function_of((0, 0), (1, 1), (1e9, 1))
-    )
-    prop.SetInterpolationTypeToNearest()
-    volume = labels_of(n, dtype)
-    used = np.unique(volume.array)[1:].astype(int)
-    vdi = pvdi.generate(volume, camera_at(60, 50, 70), SIZE, volume_property=prop)
-    drawn = vdi.color[np.isin(vdi.optical_depth, vdi.optical_depth.max())]
-    nearest = np.abs(drawn[:, None] - colors[used]).max(axis=2).min(axis=1)
-    assert nearest.max() <= 1 / 255
 
 
 def test_a_logarithmic_scale_of_colours_is_refused():

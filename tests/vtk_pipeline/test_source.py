@@ -13,7 +13,6 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import errors
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image
 from pyvista_vdi.vtk_pipeline.vtk import (
-    vtkTrivialProducer,
     vtkXMLImageDataReader,
     vtkXMLImageDataWriter,
 )
@@ -93,23 +92,6 @@ def file_of(image, path, writer):
 def read_from(path, reader):
     reader.SetFileName(str(path))
     return reader
-
-
-def test_what_only_an_update_can_tell_is_refused_by_name(expected_messages):
-    producer = vtkTrivialProducer()  # it promises a vtkDataObject
-    producer.SetOutput(pv.MultiBlock([soft_ball(6)]))
-    source = ready_source(producer)
-    for ask in (source.Update, source.GetVDI, source.GetVolume, source.MakeRequest):
-        with pytest.raises(errors.UnsupportedError, match="MultiBlock.* is not a uniform grid"):
-            ask()
-    downstream = behind(source)
-    source.Modified()
-    downstream.Update()
-    assert downstream.GetOutput().GetNumberOfPoints() == 0
-    assert "is not a uniform grid" in expected_messages.GetOutput()
-    assert expected_messages.GetOutput().count("VDISource") == 1, "not once for each block"
-    source.SetInputDataObject(soft_ball(12))
-    assert source.GetVDI().n_supersegments > 500
 
 
 def test_a_mapper_behind_a_file_keeps_its_reader(tmp_path):

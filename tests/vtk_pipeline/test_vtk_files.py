@@ -155,14 +155,3 @@ def test_damaged_forms_are_refused(damage, message):
     damage(image)
     with pytest.raises(InvalidVDIError, match=message):
         vdi_from_image(image)
-
-
-def test_metadata_of_numpy_become_plain_and_others_are_refused():
-    vdi = some_vdi()
-    vdi.metadata.update(a=np.float64(1 / 3), b=np.arange(3))
-    stored = vdi_from_image(vdi_to_image(vdi)).metadata
-    assert stored["a"] == 1 / 3
-    assert stored["b"] == [0, 1, 2]
-    vdi.metadata["a"] = object()
-    with pytest.raises(InvalidVDIError, match="metadata cannot be written.*object.*numbers, text"):
-        vdi_to_image(vdi)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -19,10 +18,9 @@ from hypothesis import strategies as st  # noqa: E402
 from strategies import random_vdi  # noqa: E402
 
 import pyvista_vdi as pvdi  # noqa: E402
-from pyvista_vdi import VDI, Camera, io  # noqa: E402
+from pyvista_vdi import VDI, Camera  # noqa: E402
 from pyvista_vdi.errors import (  # noqa: E402
     InvalidArgumentError,
-    MissingDependencyError,
     VDIFileError,
     VDIWarning,
 )
@@ -263,15 +261,6 @@ def test_truncations_are_noticed(file):
         file.write_bytes(whole[:cut])
         with pytest.raises(VDIFileError):
             pvdi.read(file)
-
-
-def test_without_the_package_it_is_said_what_to_install(file, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "OpenEXR", None)
-    monkeypatch.delitem(sys.modules, "pyvista_vdi.extensions.deep_exr.files")
-    message = r'need the package OpenEXR.*pip install "pyvista-vdi\[exr\]"'
-    for function in (pvdi.read, io.read_info, small_vdi().save, io.checked_target):
-        with pytest.raises(MissingDependencyError, match=message):
-            function(file)
 
 
 def test_convert_a_foreign_file(capsys, tmp_path):

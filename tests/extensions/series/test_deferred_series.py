@@ -70,14 +70,3 @@ def test_a_look_is_that_of_each_step_alone_and_of_one_range(alone, saved):
         shown.classified(cmap="bone")
     with pytest.raises(TypeError, match="colourmap"):
         pvdi.read(saved).classified(colourmap="bone")
-
-
-def test_values_of_another_range_are_refused(alone, tmp_path):
-    other = pvdi.generate(next(volumes()), CAMERA, SIZE, classification="deferred")
-    with pvdi.SeriesWriter(tmp_path / "run.vdis") as out:
-        out.append(alone[0])
-        for step in (other, alone[0].classified(cmap="bone")):
-            with pytest.raises(InvalidVDIError, match="number 1 .*keeps values from 20"):
-                out.append(step, 6.0)
-    with pytest.raises(InvalidVDIError, match="number 1 keeps values from 0"):
-        pvdi.VDISeries([alone[0], other])

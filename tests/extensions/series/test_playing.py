@@ -12,12 +12,11 @@ from watched_windows import (
     WINDOW,
     frame,
     picture_of,
-    small_vdi,
     threads,
 )
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, UnsupportedError, VDIWarning
+from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.model.standard_cases import filling_camera
 
 N = 4
@@ -74,35 +73,6 @@ def test_a_damaged_step_of_a_file_leaves_what_was_shown(plotter, series, tmp_pat
         np.testing.assert_array_equal(frame(plotter), before)
     actor.step = 3
     np.testing.assert_array_equal(frame(plotter), picture_of(series[3], plotter))
-
-
-def test_another_series_begins_anew_and_copies_play_by_themselves(plotter, series):
-    actor = shown(plotter, series)
-    actor.time = 0.5
-    other = actor.copy()
-    assert other.step == 2
-    other.step = 0
-    assert actor.step == 2
-    actor.vdi = series[1:]
-    assert (len(actor.series), actor.step) == (len(series) - 1, 0)
-    actor.vdi = series[0]
-    assert actor.series is None
-    assert not actor.playing
-
-
-def test_what_has_no_times_is_refused(plotter, series):
-    actor = plotter.add_vdi(small_vdi())
-    for use in (actor.play, lambda: actor.time, lambda: setattr(actor, "step", 0)):
-        with pytest.raises(InvalidArgumentError, match="shows no series"):
-            use()
-    one = plotter.add_vdi(series[:1], show_scalar_bar=False)
-    for use, error, message in (
-        (lambda: plotter.add_vdi(series, cmap="bone"), UnsupportedError, "cmap cannot be given"),
-        (lambda: actor.mapper.SetVDI([series]), InvalidVDIError, "list"),
-        (one.regenerate, InvalidArgumentError, "without a volume"),
-    ):
-        with pytest.raises(error, match=message):
-            use()
 
 
 def test_closing_while_it_plays_leaves_nothing(no_leaks, series):

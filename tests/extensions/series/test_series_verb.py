@@ -29,8 +29,8 @@ def series(volumes, tmp_path_factory, default_runtime):
     return path
 
 
-#: Values of three steps, which rise; and their times, where a file says them.
-VALUES, TIMES = (60, 120, 180), [0.5, 1.25, 3.0]
+#: Values of three steps, which rise.
+VALUES = (60, 120, 180)
 STEPS = np.stack([np.full((6, 7, 8), value, np.uint8) for value in VALUES])
 
 
@@ -42,16 +42,6 @@ def _store(folder):
     array.attrs["_ARRAY_DIMENSIONS"] = list("tzyx")
     array[:] = STEPS
     return ["t.zarr"]
-
-
-def _images(folder):
-    pv = pytest.importorskip("pyvista")
-    names = [f"step_{number}.vti" for number in (2, 9, 10)]
-    for name, values in zip(names, STEPS, strict=True):
-        image = pv.ImageData(dimensions=values.shape[::-1])
-        image["v"] = values.ravel()
-        image.save(folder / name)
-    return sorted(names)  # as a shell has them: step_10 is the first
 
 
 def _arrays(folder):
@@ -77,15 +67,6 @@ def test_all_time_steps_come_in_their_order(make, times, capsys, tmp_path, monke
     steps = pvdi.read("run.vdis")
     assert list(steps.times) == times
     assert [round(255 * float(vdi.color.mean())) for vdi in steps] == pytest.approx(VALUES, abs=2)
-
-
-def test_single_files_and_series_become_series(series, capsys, tmp_path):
-    steps, back, again = pvdi.read(series), tmp_path / "back.vdis", tmp_path / "again.vdis"
-    files = [vdi.save(tmp_path / f"a_{i}.vdi") for i, vdi in enumerate(steps)]
-    run(capsys, "series", *files, "-o", back, "--times", "0,0.5,2")
-    assert all(a.equals(b) for a, b in zip(pvdi.read(back), steps, strict=True))
-    run(capsys, "convert", back, "-o", again, "--compression", "lz4")
-    assert pvdi.read(again)[2].equals(steps[2])
 
 
 def test_a_step_is_shown_by_its_time(series, capsys, tmp_path):

@@ -112,15 +112,3 @@ def test_what_is_read_and_rendered_is_that_of_each_view(views, saved, tmp_path):
         pvdi.VDISet([views[0], baked[1]])
     with pytest.raises(TypeError, match="generate_set.*generate_series"):
         pvdi.generate_set(soft_ball(12), window_size=SIZE, classification="deferred")
-
-
-def test_its_property_is_followed_in_a_plotter(plotter, saved):
-    actor = plotter.add_vdi(str(saved), show_scalar_bar=False, **LOOK)
-    plotter.show(auto_close=False)
-    pictures = []
-    for _ in range(2):
-        values = [view.classified(volume_property=actor.prop) for view in pvdi.read(saved)]
-        pictures.append(frame(plotter))
-        assert np.abs(pictures[-1] - picture_of(pvdi.VDISet(values), plotter)).max() <= 1
-        actor.prop.GetScalarOpacity().AddPoint(60, 1.0)
-    assert np.abs(pictures[1] - pictures[0]).max() > 8

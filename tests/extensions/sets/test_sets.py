@@ -68,21 +68,6 @@ def test_the_nearest_is_that_of_the_least_angle(made, around):
         assert made.nearest(view) == int(np.argmin(angles))
 
 
-def test_of_two_eyes_in_a_line_the_one_at_that_distance_is_nearest(made, around):
-    centre = np.asarray(around.focal_point)
-    vdi = made[0]
-
-    def at(k):
-        return around.replace(position=centre + k * np.subtract(around.position, centre))
-
-    both = pvdi.VDISet([vdi, vdi], [at(1), at(3)])
-    assert both.nearest(at(1)) == 0
-    assert both.nearest(at(3)) == 1
-    # Twice as far is ln 2, as if turned by that angle
-    for k in (2, 1e300):
-        assert both.distances(at(k))[0] == pytest.approx(np.degrees(np.log(k)), rel=1e-6)
-
-
 def test_weights_add_up_and_nothing_jumps_on_a_path(made, around):
     # In steps of .05 degrees a distance changes by that at most, a share by twice that over the
     # reach: at least a few hundredths of a degree but where three others are as near
@@ -103,15 +88,6 @@ def test_a_picture_is_the_weighted_mean(made, around):
         blended += len(weights) > 1
         assert np.allclose(pvdi.render(made, view), mean, atol=1e-6)
     assert blended > 3  # or the test shows nothing
-
-
-def test_pick_depth_and_a_joint_scene_are_those_of_the_nearest(made, around):
-    view, middle = around.azimuth(20), (SIZE[0] // 2, SIZE[1] // 2)
-    nearest = made[made.nearest(view)]
-    assert pvdi.pick(made, view, middle) == pvdi.pick(nearest, view, middle, SIZE)
-    assert np.array_equal(pvdi.render_depth(made, view), pvdi.render_depth(nearest, view, SIZE))
-    together = pvdi.render([made, made[0]], view, window_size=SIZE)
-    assert np.array_equal(together, pvdi.render([nearest, made[0]], view, window_size=SIZE))
 
 
 def test_a_vdi_of_a_set_is_what_generate_makes(made, volume):

@@ -1,11 +1,8 @@
-"""The viewer's modules as one script: order, what is left out, what is refused."""
+"""The viewer's modules as one script: order, and what is left out."""
 
 import re
-from importlib import resources
 
-import pytest
-
-from pyvista_vdi.extensions.web.bundle import SPAWN, bundled, viewer_script
+from pyvista_vdi.extensions.web.bundle import bundled
 
 MODULES = {
     "a.js": 'import { b, B } from "./b.js";\nimport {\n  spawn,\n} from "./spawn.js";\n'
@@ -23,30 +20,3 @@ def test_what_is_needed_comes_first_and_once():
     assert "const { B, b, serve } = workerPart();" in script
     assert not re.search(r"\b(import|export)\b|twice$|Two lines|What|so$", script, re.MULTILINE)
     assert "workerPart" not in bundled(MODULES, ["b.js"])
-
-
-REFUSED = [
-    'import * as all from "./b.js";\n',
-    "import { B } from './b.js';\n",
-    "export default 3;\n",
-    'const lazy = () => import("./b.js");\n',
-    "const here = import.meta.url;\n",
-    "const t = '</script>';\n",
-]
-
-
-@pytest.mark.parametrize("text", REFUSED)
-def test_modules_that_cannot_be_bundled_are_refused(text):
-    with pytest.raises(ValueError, match="of a form that is not bundled|end a <script>"):
-        bundled({**MODULES, "a.js": text + MODULES["a.js"]}, ["a.js"])
-
-
-def test_every_module_of_the_viewer_can_be_bundled():
-    folder = resources.files("pyvista_vdi.extensions.web") / "viewer"
-    modules = [entry for entry in folder.iterdir() if entry.name.endswith(".js")]
-    sources = {entry.name: entry.read_text(encoding="utf-8") for entry in modules}
-    for name in sources.keys() - {SPAWN}:
-        bundled(sources, [name])
-    # With its controls and its editor, as text
-    assert len(viewer_script()) <= 150_000
-    assert len(viewer_script("scene.js", "remote.js")) <= 175_000

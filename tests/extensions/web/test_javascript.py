@@ -1,7 +1,6 @@
-"""What of the viewer needs no browser, by Node where that is installed; and its package."""
+"""What of the viewer needs no browser, by Node where that is installed."""
 
 import os
-import re
 import shutil
 import subprocess
 from importlib import resources
@@ -11,8 +10,6 @@ import numpy as np
 import pytest
 import pyvista as pv
 from in_node import in_node
-
-from pyvista_vdi import __version__
 
 HERE = Path(__file__).parent / "javascript"
 VIEWER = resources.files("pyvista_vdi.extensions.web") / "viewer"
@@ -31,12 +28,6 @@ def test_units():
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-
-
-def test_the_package_has_the_version_of_this_one():
-    text = (VIEWER / "package.json").read_text(encoding="utf-8")
-    version = re.search(r'"version": "([^"]+)"', text)[1]
-    assert __version__.startswith(version)
 
 
 #: What is done by which button, with which keys, and how far.

@@ -12,11 +12,9 @@ import pytest
 import strategies
 from browsers import COUNTING, array_of, file_of, in_base64
 from oracle import explain
-from real_data import require_data
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import VDI
 
 #: See above.
@@ -208,26 +206,3 @@ def test_a_vdi_is_swapped_whole_and_nothing_is_left_behind(open_page):
         page.evaluate("raycaster.set({ ...raycaster.vdi, windowSize: [1e6, 1] })")
     page.evaluate("() => raycaster.dispose()")
     assert page.evaluate("alive.Texture") == before
-
-
-@pytest.mark.real_data
-def test_a_real_volume_is_drawn_as_by_the_kernels(raycaster):
-    volume, size = require_data("brain"), (160, 90)
-    camera = filling_camera(volume.bounds, size)
-    low, high = np.reshape(volume.bounds, (3, 2)).T
-    inside = camera.replace(
-        position=low + 0.45 * (high - low), focal_point=low + (0.9, 0.6, 0.7) * (high - low),
-        view_angle=60,
-    )  # fmt: skip
-    scale = float(np.linalg.norm(high - low)) * 0.4
-    parallel = camera.azimuth(30).replace(parallel_projection=True, parallel_scale=scale)
-    vdi = pvdi.generate(volume, camera, size, cmap="bone")
-    for precision in PRECISIONS:
-        kept = vdi.with_precision(precision)
-        raycaster.give(kept)
-        for view in (camera.azimuth(30), camera.elevation(60), inside, parallel):
-            wanted = pvdi.render(kept, view, size)
-            assert wanted[..., 3].max() > 0.1
-            error = 255 * np.abs(raycaster.draw(view, size) - wanted).max(axis=-1)
-            assert np.mean(error <= 2) >= 0.999, precision
-            assert error.max() <= 24, precision

@@ -12,6 +12,7 @@ from skimage.metrics import structural_similarity
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.extensions.web.scene import scene_of
+from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
@@ -200,26 +201,35 @@ def test_export_html_writes_a_page_that_shows_the_scene(plotter, from_disk, tmp_
     assert pvdi.read(path).equals(vdi.with_precision("8-byte"))
 
 
-def test_what_is_not_shown_is_named_in_one_warning(plotter):
-    actor = ball(plotter)
-    actor.mapper.SetCropping(1)
-    plotter.add_mesh(pv.Sphere(), pbr=True, name="ball")
-    plotter.add_mesh(pv.Cone(), opacity=0.5, name="cone")
-    plotter.add_mesh(pv.Cube(), style="wireframe", name="cube")
-    ball(plotter, at=(0.5, 0, 0))
-    plotter.show_grid()
-    plotter.set_background("y", side="b")
-    with pytest.warns(VDIWarning, match="shows the scene without") as warned:
-        plotter.vdi.export_html(None)
-    assert len(warned) == 1
-    words = str(warned[0].message)
-    for what in (
-        "cropping (PlotterVDIActor)",
-        "physically based shading (ball)",
-        "what is translucent (cone)",
-        "its wireframe (cube)",
-        "a background's gradient",
-        "the mixing of VDIs that overlap",
-        "its place in other views than the first (CubeAxesActor)",
-    ):
-        assert what in words
+def test_a_series_beside_a_vdi_and_a_mesh_is_whole_in_the_page_and_plays(
+    plotter, from_disk, tmp_path
+):
+    """The first VDI is a single one, and the series no more than half as dense."""
+    volumes = [soft_ball(16) for _ in range(3)]
+    for step, volume in enumerate(volumes):
+        volume.origin = np.add(volume.origin, (0.2 * step, 0, 0))
+    camera = filling_camera((-1, 1.4, -1, 1, -1, 1), SIZE)
+    looks = {"cmap": "viridis", "opacity": "linear", "clim": (0, 255)}
+    series = pvdi.generate_series(volumes, camera, SIZE, range(3), **looks)
+    as_it_is = {"show_scalar_bar": False, "draw": "vdi", "regenerate": "never"}
+    single = plotter.add_vdi(series[0].with_precision("8-byte"), **as_it_is)
+    single.position = (0, 2.1, 0)
+    actor = plotter.add_vdi(series, **as_it_is)
+    actor.opacity_multiplier = 0.5
+    plotter.add_mesh(pv.Sphere(radius=0.3, center=(0, 0, 1)), color="tomato", lighting=False)
+    plotter.camera_position = (camera.position, camera.focal_point, camera.view_up)
+    plotter.camera.view_angle = camera.view_angle
+    plotter.set_background("k")
+    path = tmp_path / "scene.html"
+    plotter.vdi.export_html(path)
+    page = from_disk(path)
+    page.ready()
+    assert page.evaluate("viewer.series.times") == [0, 1, 2]
+    for time in (0, 2):
+        page.evaluate("(time) => { viewer.time = time; return viewer.ready.then(() => 0) }", time)
+        actor.time = time
+        plotter.render()
+        assert_as_vtk(page, plotter)
+    again = pvdi.read(path)
+    assert isinstance(again, pvdi.VDISeries)
+    assert again.times == series.times

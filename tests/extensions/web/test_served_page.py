@@ -5,7 +5,7 @@ import urllib.request
 
 import numpy as np
 import pytest
-from browsers import assert_axe_finds_nothing, picture
+from browsers import picture
 from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
@@ -26,14 +26,6 @@ SIZE = (240, 180)
 #: coincide: .94 to .97 where a full VDI is shown, below .9 by that of the view before.
 ENOUGH = 0.92
 
-#: Gives its sockets away.
-SOCKETS = """
-window.sockets = [];
-window.WebSocket = class extends WebSocket {
-  constructor(...given) { super(...given); sockets.push(this); }
-};
-"""
-
 
 @pytest.fixture(scope="module")
 def server(default_runtime):
@@ -44,7 +36,7 @@ def server(default_runtime):
 @pytest.fixture
 def page(server, open_page):
     viewport = {"width": SIZE[0], "height": SIZE[1] + 20}
-    return open_page(url=server.url, before=SOCKETS, viewport=viewport)
+    return open_page(url=server.url, viewport=viewport)
 
 
 def camera_of(page):
@@ -87,17 +79,6 @@ def test_a_page_is_sent_what_its_view_needs(page):
     wait(page, "remote.received.vdis === 3")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-def test_axe_finds_nothing(scheme, server, open_page):
-    viewport = {"width": 390, "height": 700}
-    page = open_page(url=server.url, viewport=viewport, color_scheme=scheme)
-    wait(page, "remote.received.vdis === 1")
-    assert_axe_finds_nothing(page)
-    page.page.get_by_label("Settings", exact=True).first.click()
-    assert_axe_finds_nothing(page)
-
-
 def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
     default_runtime, open_page
 ):
@@ -110,13 +91,8 @@ def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
     refusals = "ERR_CONNECTION|WebSocket|403"
     page = open_page(url=serving.url, viewport=viewport, expected=refusals)
     wait(page, "remote.received.vdis === 1")
-    height = page.evaluate("viewer.clientHeight")
     serving.close()
     wait(page, f"{line}.includes('no connection to the server; trying again in')")
-    # All of it can be read, and the viewer is as large as before
-    hidden = "(({ scrollHeight, clientHeight }) => scrollHeight - clientHeight)"
-    assert page.evaluate(f"{hidden}(document.querySelector('#status'))") == 0
-    assert page.evaluate("viewer.clientHeight") == height
     serving = serve("a", serving.port)
     wait(page, f"remote.received.vdis === 2 && !{line}.includes('trying')")
     serving.close()

@@ -50,14 +50,6 @@ test("bands are as high as a movement may wait for", async () => {
   assert.equal(sum(fast.bands), 180);
 });
 
-test("a device that has become slower is given less at once", async () => {
-  const [, full] = await drawn([1280, 720, 0, 1e-5], [1280, 720, 0, 0.02]);
-  assert.equal(full.bands[0], 720); // nothing said that it had
-  const [, , later] = await drawn([320, 180, 0, 5e-4], [320, 180, 0, 5e-3], [320, 180, 0, 5e-3]);
-  assert.ok(Math.max(...later.bands) <= 18); // the mean of both
-  assert.equal(later.bands.at(-2), 10);
-});
-
 test("a movement has the pixels that a thirtieth of a second allows", async () => {
   const [, { next }] = await drawn([1280, 720, 0, 1e-4], [1280, 720, 0, 1e-4]); // 72 ms for all
   assert.ok(Math.abs((next[0] * next[1]) / (1280 * 720) - 1 / 30 / 0.072) < 0.01);

@@ -100,15 +100,6 @@ test("the last step that is asked for counts, and what was given up comes later"
   assert.throws(() => player.play({ rate: 0 }), /above 0/);
 });
 
-test("the last steps are kept, and no more of them", async () => {
-  const series = seriesOf(9), { player } = playing(series);
-  for (const step of [0, 1, 2, 3, 4, 5, 6, 7, 6, 3, 1]) {
-    player.step = step;
-    await settled();
-  }
-  assert.deepEqual(series.asked, [0, 1, 2, 3, 4, 5, 6, 7, 1]);
-});
-
 test("of a set the nearest is shown, and its neighbours are there", async () => {
   const view = (angle, distance = 4) => ({ position: [distance * Math.cos(angle), distance * Math.sin(angle), 0],
     view_angle: 30, model_transform: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] });
@@ -171,13 +162,4 @@ test("a series is read from its beginning, as its steps come", async () => {
   assert.deepEqual([lengths, series.length, series.complete, series.times], [[1, false], 2, true, [0, 0.5]]);
   assert.deepEqual([-1, 0.25, 0.3, 9].map((time) => series.nearest(time)), [0, 0, 1, 1]);
   await assert.rejects(Series.ofPieces(bytes.subarray(0, 90), [], () => {}), /no whole VDI/);
-});
-
-test("what a series' JSON says wrongly is refused by a sentence", async () => {
-  const set = { format: "pyvista-vdi-set", version: 1, views: [], bounds: [0, 1, 0, 1, 0, 1], camera: {} };
-  for (const [name, head, why] of [
-    ["series.json", {}, /no series of VDIs/], ["series.json", { ...SERIES, version: 7 }, /version 7/],
-    ["series.json", { ...SERIES, times: [0, null] }, /says what cannot be/],
-    ["series.json", { ...SERIES, times: [] }, /no whole VDI/], ["set.json", set, /set.json says what cannot be/],
-  ]) await assert.rejects(Series.ofPieces(zipped({ [name]: json(head) }), [], () => {}), why);
 });

@@ -1,14 +1,14 @@
 // Pure functions of the viewer, by Node: node --test in this folder. No browser is needed.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { textOf, viewerModule } from "./viewer.js";
+import { viewerModule } from "./viewer.js";
 
 const { checkedCamera, checkedPlane, fitted, nearer, panned, rotated } = await viewerModule("camera.js");
 const { dragOf, dragged, keyed } = await viewerModule("interaction.js");
 const { textOfView, viewOfText } = await viewerModule("link.js");
-const { AS_MADE, checkedLook, isAsMade } = await viewerModule("look.js");
+const { checkedLook, isAsMade } = await viewerModule("look.js");
 const { frameOf, listSpace, pixelRays, modelPoint, pixelsOfBoxes } = await viewerModule("rays.js");
-const { checkedTransfer, editedFrom } = await viewerModule("values.js");
+const { editedFrom } = await viewerModule("values.js");
 const { GrowingBytes, crc32 } = await viewerModule("bytes.js");
 
 const camera = checkedCamera({
@@ -23,15 +23,6 @@ test("a view goes into text and comes back with every bit", () => {
   }
 });
 
-test("what is no transfer function is refused by name", () => {
-  for (const [transfer, why] of [
-    [{ cmap: "no", clim: [0, 1], points: [0, 1] }, /colour map is one of gray/],
-    [{ clim: [1, 0], points: [0, 1] }, /clim is two numbers/],
-    [{ clim: [0, 1], points: [0.5, 1, 0.4, 1] }, /1 to 64 points/],
-    [{ clim: [0, 1], points: [0, 2] }, /1 to 64 points/], [{ clim: [0, 1], points: [] }, /1 to 64 points/],
-  ]) assert.throws(() => checkedTransfer(transfer), { name: "TypeError", message: why });
-});
-
 test("a curve becomes few points, which are on it", () => {
   const opacities = Array.from({ length: 257 }, (_, k) => Math.max(0, 1 - Math.abs(k - 128) / 32));
   const { points, clim } = editedFrom({ opacities, scalar_range: [2, 5] });
@@ -41,12 +32,6 @@ test("a curve becomes few points, which are on it", () => {
   assert.ok(editedFrom({ opacities: bump, scalar_range: [0, 1] }).points.includes(0.01));
   assert.deepEqual(editedFrom({ opacities: [0.3], scalar_range: [4, 4] }),
     { cmap: null, clim: [3.5, 4.5], points: [0, 0.3, 1, 0.3] });
-});
-
-test("what is as it was made is not said", () => {
-  const text = textOfView({ camera, look: AS_MADE });
-  assert.doesNotMatch(text, /brightness|opacity|clip/);
-  assert.deepEqual(viewOfText(text), { camera, look: checkedLook({}) });
 });
 
 test("what is no view is refused", () => {
@@ -120,19 +105,4 @@ test("bytes come in pieces, also as text that ends anywhere", () => {
   assert.deepEqual(growing.whole, bytes);
   assert.throws(() => growing.push("????"), /no base64/);
   assert.equal(crc32(new TextEncoder().encode("123456789")), 0xcbf43926);
-});
-
-test("types and manifest have what the element has", () => {
-  const source = textOf("element.js"), types = textOf("element.d.ts");
-  const [{ declarations: [told] }] = JSON.parse(textOf("custom-elements.json")).modules;
-  const members = new Set([...source.matchAll(/^  (?:async )?(?:[gs]et )?(\w+)\(.*\) \{$/gm)]
-    .map(([, name]) => name).filter((name) => !/Callback$|^constructor$|^if$|^for$|^while$/.test(name)));
-  const names = told.members.map(({ name }) => name);
-  assert.deepEqual([...members].sort(), names.toSorted());
-  for (const name of names) assert.match(types, new RegExp(`\\b${name}[?]?[(:]`), name);
-  const observed = source.match(/observedAttributes = \[(.*)\]/)[1].match(/[\w-]+/g);
-  const attributes = told.attributes.map(({ name }) => name);
-  for (const name of observed) assert.ok(attributes.includes(name), name);
-  const events = new Set([...source.matchAll(/new CustomEvent\("(\w+)"/g)].map(([, name]) => name));
-  assert.deepEqual([...events].sort(), told.events.map(({ name }) => name).sort());
 });
