@@ -13,7 +13,7 @@ from typing import Any
 
 from shared import Case, Results, benches, execute, mean_of, parser_of, table  # beside this file
 
-from pyvista_vdi import render_volume
+from pyvista_vdi import Settings, render_volume
 from pyvista_vdi.measure.bench import ratio, take_turns
 
 #: Degrees from V_O at which VTK's mappers and ours draw the volume.
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 render_volume,
                 *(bench.volume, bench.view, bench.size),
                 transfer_function=bench.table,
-                sample_distance=bench.step,
+                settings=Settings(sample_distance=bench.step),
                 early_termination=False,
                 device=bench.runtime,
             )
