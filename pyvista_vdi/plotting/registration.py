@@ -77,10 +77,8 @@ class _Watch(MetaPathFinder):
         """Find nothing of its own, and have the plotters' module offer what there is."""
         if name != _PLOTTERS:
             return None
-        # It stays in the list: other threads may be walking it, and would miss the next finder.
-        # Others of its kind, where this module was imported twice, would ask it in turn
-        kind = type(self).__qualname__
-        others = (each for each in sys.meta_path if type(each).__qualname__ != kind)
+        # It stays in the list: other threads may be walking it. Of a second import is another
+        others = (each for each in sys.meta_path if type(each).__qualname__ != "_Watch")
         found = (each.find_spec(name, path, target) for each in others)
         spec = next((each for each in found if each is not None), None)
         loader: Any = None if spec is None else spec.loader
