@@ -77,7 +77,7 @@ def new_vdi_appears_by_itself():
     assert actor.vdi is not old
     assert actor.status.angle < 1e-6
     assert plotter.camera.position == turned
-    wait(plotter, lambda: not actor.mapper.driver.following)
+    wait(plotter, lambda: not actor.mapper.driver.goes_on)
     plotter.close()
 
 

@@ -256,11 +256,6 @@ class Driver(Planner):
 
     # Between frames
 
-    @property
-    def following(self) -> bool:
-        """Whether the event loop looks at what goes on."""
-        return self._timer.running
-
     def follow(self, window: Any) -> None:
         """Start the event loop's timer, if something goes on and no hand moves."""
         if self.goes_on and not Window.of(window).moving:

@@ -11,6 +11,7 @@ from pyvista_vdi.vtk_pipeline.filters.properties import check_property, color_fu
 
 _PIPELINE = vtk.vtkStreamingDemandDrivenPipeline
 TIME_STEPS = _PIPELINE.TIME_STEPS()
+WHOLE_EXTENT = _PIPELINE.WHOLE_EXTENT()
 UPDATE_TIME_STEP = _PIPELINE.UPDATE_TIME_STEP()
 
 
@@ -225,7 +226,7 @@ def announce(
     """
     width, height = window_size
     information = outputs.GetInformationObject(0)
-    information.Set(_PIPELINE.WHOLE_EXTENT(), (0, width - 1, 0, height - 1, 0, 0), 6)
+    information.Set(WHOLE_EXTENT, (0, width - 1, 0, height - 1, 0, 0), 6)
     information.Set(vtk.vtkImageData.SPACING(), (1.0, 1.0, 1.0), 3)
     information.Set(vtk.vtkImageData.ORIGIN(), (0.0, 0.0, 0.0), 3)
     vtk.vtkDataObject.SetPointDataActiveScalarInfo(information, *scalars)
@@ -250,6 +251,6 @@ def wanted_time(information: Any) -> float | None:
 def ask_for_all(inputs: Any) -> None:
     """Ask for the whole input, whatever part of the output is wanted."""
     information = inputs[0].GetInformationObject(0)
-    if information is not None and information.Has(_PIPELINE.WHOLE_EXTENT()):
-        whole = information.Get(_PIPELINE.WHOLE_EXTENT())
+    if information is not None and information.Has(WHOLE_EXTENT):
+        whole = information.Get(WHOLE_EXTENT)
         information.Set(_PIPELINE.UPDATE_EXTENT(), whole, 6)

@@ -18,6 +18,7 @@ from pyvista_vdi.model.vdi import VDI, picture_view
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
+    WHOLE_EXTENT,
     Classifying,
     accessors,
     announce,
@@ -118,7 +119,9 @@ class VDIToImage(Classifying):
         if size is None and is_vdi_image(image):
             with suppress(InvalidVDIError):  # _execute says it
                 size = picture_view(self._read(image))[1]
-        announce(outputs, size or (1, 1), SCALARS)
+        # Before there are data, what stands for a reader in ParaView knows the lists alone
+        whole = inputs[0].GetInformationObject(0).Get(WHOLE_EXTENT) or (0,) * 4
+        announce(outputs, size or (whole[1] + 1, whole[3] + 1), SCALARS)
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
