@@ -351,6 +351,7 @@ class VDISource(OptionMethods, Classifying):
 
     def MakeVDI(self, request: Request) -> VDI:
         """Return the VDI of a request, made now; what the source has made stays."""
+        self.SetAbortExecute(0)  # of this VDI nobody has said it yet
         asked = request.generation.replace(progress=self._advance)
         if request.deferral.deferred:
             return generate_deferred(asked, request.deferral)  # type: ignore[return-value]
@@ -400,7 +401,6 @@ class VDISource(OptionMethods, Classifying):
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
-        self.SetAbortExecute(0)  # of this execution nobody has said it yet
         request = self._make_request(vtkDataObject.GetData(inputs[0], 0), None, warn=True)
         if self._vdi is None or self._request is None or request.key != self._request.key:
             self._vdi = self.MakeVDI(request)
