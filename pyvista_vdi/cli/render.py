@@ -82,7 +82,8 @@ def view(options: argparse.Namespace) -> int:
                 # The error itself is raised below; no file is written then
                 warnings.filterwarnings("ignore", "the VDI cannot be drawn", VDIWarning)
                 picture = plotter.screenshot(return_img=True)
-            actor.mapper.driver.raise_trouble()
+            if (trouble := actor.mapper.driver.trouble) is not None:
+                raise trouble
             write_png(np.asarray(picture), target)
             print(f"{printable(options.screenshot)}: written")
             return 0

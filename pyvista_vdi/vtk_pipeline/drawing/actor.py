@@ -196,7 +196,7 @@ class VDIActorMethods:
             If no renderer of a window shows the actor.
         """
         mapper = self.GetMapper()
-        shown = [] if mapper is None else mapper.driver.renderers()
+        shown = [] if mapper is None else mapper.driver.renderers
         shown = [r for r in shown if r.GetRenderWindow() is not None]
         if not shown:
             raise InvalidArgumentError(
@@ -240,7 +240,7 @@ class VDIActorMethods:
         mapper.driver.retry()
         matrix = as_array(self.GetMatrix())
         renderer, shown = mapper.driver.renderer(), mapper.driver.input
-        shown.note_scene(mapper.driver.renderers(), matrix)
+        shown.note_scene(mapper.driver.renderers, matrix)
         if camera is not None:
             source.SetCamera(camera, matrix)
         elif renderer is not None:
@@ -326,12 +326,7 @@ class VDIActorMethods:
             If no series is shown, the rate is none, or the limit no number of bytes.
         """
         self._player().play(rate, loop=loop, memory_limit=memory_limit)
-        driver = self.GetMapper().driver
-        renderer = driver.renderer()
-        window = None if renderer is None else renderer.GetRenderWindow()
-        # Before the first frame there is nothing to look at, and that frame looks itself
-        if window is not None and not window.GetNeverRendered():
-            driver.follow(window)
+        self.GetMapper().driver.follow()
 
     def pause(self: Any) -> None:
         """Stay at the step that is shown.

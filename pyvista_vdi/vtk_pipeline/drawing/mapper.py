@@ -26,13 +26,12 @@ COARSEST = 4.0
 def _on_start(mapper: Any, event: str) -> None:
     driver = mapper.driver
     driver.begin(mapper)
-    driver.box.begin(driver.actor)
+    driver.box.begin(driver.actor())
 
 
 def _on_end(mapper: Any, event: str) -> None:
-    driver = mapper.driver
-    driver.end()
-    driver.box.end()
+    mapper.driver.end()
+    mapper.driver.box.end()
 
 
 @with_settings
@@ -164,7 +163,7 @@ class VDIMapperMethods:
         theirs: Any = other
         shown = other.driver.input
         self.driver.set_input(None if shown is None else shown.shared())
-        self.driver.set(**vars(other.driver.settings))
+        self.driver.settings = other.driver.settings
         cropping = ("Cropping", "CroppingRegionPlanes", "CroppingRegionFlags")
         for name in ("Device", "MaximumImageSampleDistance", *cropping):
             getattr(self, f"Set{name}")(getattr(theirs, f"Get{name}")())
