@@ -86,6 +86,7 @@ class Driver(Planner):
             driver = weak()
             if driver is not None:
                 driver.box.connect()
+                driver.follow()
 
         if self.input is not None:
             self.input.watch(None)

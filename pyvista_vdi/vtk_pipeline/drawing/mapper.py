@@ -97,7 +97,7 @@ class VDIMapperMethods:
         self.SetInputData(args[-1])
 
     def SetInputData(self, data: Any) -> None:
-        """Draw a VDI, its canonical image, a series (:attr:`VDIActor.time`) or a set of VDIs."""
+        """Draw a VDI, its canonical image, a series (:attr:`VDIActor.player`) or a set of VDIs."""
         self._set_input(None if data is None else input_of(data))
 
     SetVDI = SetInputData

@@ -406,7 +406,7 @@ class Planner:
     @property
     def goes_on(self) -> bool:
         """Whether something goes on that the event loop has to look at."""
-        if self._asked is not None or (self.input is not None and self.input.busy):
+        if self._asked is not None or (self.input is not None and self.input.playing):
             return True
         return self.seen is not None and now() - self._moved_at < SETTLED
 
