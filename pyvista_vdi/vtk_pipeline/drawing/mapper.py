@@ -39,25 +39,20 @@ def _on_end(mapper: Any, event: str) -> None:
 class VDIMapperMethods:
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
-    _driver: Driver | None = None
+    #: What draws; made with the mapper, before which PyVista's constructor sets some settings.
+    driver: Any = None
 
     def _become_vdi_mapper(self: Any) -> None:
         """Install proxy and observers; to be called once, from ``__init__``."""
-        self._driver = Driver()
+        self.driver: Driver = Driver()
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)
         super().SetScalarModeToUsePointData()  # type: ignore[misc]
-        super().SetInputConnection(self._driver.box.GetOutputPort())  # type: ignore[misc]
+        super().SetInputConnection(self.driver.box.GetOutputPort())  # type: ignore[misc]
         # Plain functions: they get the mapper from VTK and hold nothing
         self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
         self.AddObserver("VolumeMapperRenderEndEvent", _on_end)
-
-    @property
-    def driver(self) -> Driver:
-        """What draws; made with the mapper."""
-        assert self._driver is not None
-        return self._driver
 
     def own_source(self, what: str) -> VDISource:
         """Return the source, which no other mapper draws from now on.

@@ -37,7 +37,7 @@ from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, renderer_view, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import Warnings
-from pyvista_vdi.vtk_pipeline.interaction.window import Window, now
+from pyvista_vdi.vtk_pipeline.interaction.window import now
 
 _log = logging.getLogger(__name__)
 
@@ -81,7 +81,6 @@ class Planner:
         self._refused: tuple[Any, Any] | None = None  # a content that the device cannot draw
         self._stamp: Any = None  # of all that the last frame depended on
         self._moved_at, self._number = -math.inf, (0, 0)  # and of what frame of which window
-        self._pixels = 0.0  # of the last frame, in which the volume may be seen
 
     def drop(self) -> None:
         """Cancel what is being made in the background."""
@@ -204,11 +203,12 @@ class Planner:
         self._stamp = stamp
         vdi, made_of = source.last(), source.source.GetCurrentRequest()
         known = vdi is not None and made_of is not None
-        content, volume, self._pixels = None, "whole", 0.0
+        content, volume, late, each = None, "whole", False, self.costs.volume
         if wanted is not None:
             content = wanted.content
-            if watched:
-                self._pixels = frame.covered_by(wanted.volume.bounds)
+            if watched and each is not None and settings.target_fps != 0:
+                seconds = each * frame.covered_by(wanted.volume.bounds)
+                late = window.pace.late(seconds, window.rate(settings))
             if self._refused is not None and content == self._refused[0]:
                 volume = self._refused[1]
         previews = window.previews(settings)
@@ -229,7 +229,7 @@ class Planner:
             first_look=first,
             made=self._as_made(vdi, frame, made_of) if known else None,  # type: ignore[arg-type]
             volume=volume,  # type: ignore[arg-type]
-            late=watched and self._late(window),
+            late=late,
             seconds=1 / (window.pace.headroom * window.rate(settings)) if previews else None,
             **self._going_on(),
         )
@@ -250,20 +250,13 @@ class Planner:
         of = (weakref.ref(vdi), vdi.bounds, content, screen, angle, detail, covered)
         return Made(*of, frame.covered_by(vdi.bounds))
 
-    def _late(self, window: Window) -> bool:
-        """Whether the volume's own full frames of the last view miss the rate."""
-        each, settings = self.costs.volume, self.settings
-        if each is None or settings.target_fps == 0:
-            return False
-        return window.pace.late(each * self._pixels, window.rate(settings))
-
     # What is planned is done
 
-    def _do(self, planned: Plan, seen: Seen, source: SourceInput, frame: Frame | None) -> None:
+    def _do(self, planned: Plan, seen: Seen, source: SourceInput, frame: Frame) -> None:
         """Begin, or give up, what goes on in the background, and make what a frame waits for."""
         if planned.give_up:
             self.drop()
-        if planned.follow and frame is not None:
+        if planned.follow:
             source.follow_if_changed(*frame.seen_from)
         if planned.make is not None:
             try:
@@ -277,7 +270,7 @@ class Planner:
                 self.worker.put(vdi_job(request.generation, request.target))
         if planned.estimate:
             self._estimate(source, seen.view)
-        if planned.update and frame is not None:
+        if planned.update:
             self._update(source)
 
     def _estimate(self, source: SourceInput, view: View) -> None:
@@ -361,7 +354,7 @@ class Planner:
     # Between frames
 
     def advance(self) -> bool:
-        """Take what was made in the background; whether there is another VDI to be drawn."""
+        """Take what was made in the background; whether a frame has something new to look at."""
         try:
             another = None if self.input is None else self.input.advance()
         except Exception as error:
@@ -379,7 +372,7 @@ class Planner:
         (request, self._asked), self.making = (self._asked, None), None
         if isinstance(made, ViewEstimate):
             self.estimate = made
-            return False
+            return True
         assert isinstance(self.input, SourceInput)
         self.input.source.TakeVDI(made, request)
         self.estimate = None
@@ -387,28 +380,16 @@ class Planner:
             self._volume = None
         return True
 
-    def begin_at_rest(self, window: Window) -> None:
-        """Begin what a view at rest is missing, though no frame asks."""
-        source, seen = self.input, self.seen
-        if not isinstance(source, SourceInput) or seen is None or source.stamp() != self._stamp:
-            return  # what has changed is for a frame to look at
-        still, moving = now() - self._moved_at >= SETTLED, window.moving
-        self.seen = seen = replace(
-            seen,
-            hand=moving and not still,
-            settled=still and not moving,
-            first_look=False,
-            late=self._late(window),
-            **self._going_on(),
-        )
-        self._do(plan(seen), seen, source, None)
+    @property
+    def unsettled(self) -> bool:
+        """Whether what the view is missing at rest is still to be begun, by another frame."""
+        return self.seen is not None and not self.seen.settled
 
     @property
     def goes_on(self) -> bool:
         """Whether something goes on that the event loop has to look at."""
-        if self._asked is not None or (self.input is not None and self.input.playing):
-            return True
-        return self.seen is not None and now() - self._moved_at < SETTLED
+        playing = self.input is not None and self.input.playing
+        return self._asked is not None or playing or self.unsettled
 
     # What is asked for between frames
 

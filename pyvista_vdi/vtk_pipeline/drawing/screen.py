@@ -40,7 +40,7 @@ class _Texture:
             self._texture.Deactivate()
 
     def release(self) -> None:
-        """Free it, for the next frame to fill it anew; a mapper may keep the object."""
+        """Free it, for the next frame to fill it anew."""
         window = None if self._texture is None else self._texture.GetContext()
         if window is not None:
             self._texture.ReleaseGraphicsResources(window)
@@ -69,11 +69,6 @@ class ImageTexture(_Texture):
             self._uploaded = image
         texture.Activate()
         return int(texture.GetTextureUnit())
-
-    def release(self) -> None:
-        """Free the texture and its object."""
-        super().release()
-        self._texture = self._uploaded = None
 
 
 class NoDepth(_Texture):
@@ -161,7 +156,8 @@ def show_image(actor: Any, renderer: Any = None) -> None:
     peeled = occluded = False
     if renderer is not None:
         peeled = renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes()
-        occluded = "vtkSSAOPass" in _passes(renderer.GetPass())
+        first = renderer.GetPass()
+        occluded = first is not None and "vtkSSAOPass" in _passes(first)
     if occluded and actor.GetPropertyKeys() is not None:  # which the pass has given it
         actor.GetPropertyKeys().Remove(vtkOpenGLActor.GLDepthMaskOverride())
     text = _PEELED if peeled else _LOOKUP + _UNSEEN if occluded else _LOOKUP
@@ -178,13 +174,12 @@ def show_image(actor: Any, renderer: Any = None) -> None:
 
 def _passes(first: Any) -> set[str]:
     """Return the classes of a render pass and of those behind it."""
-    if first is None:
-        return set()
     behind = [first.GetDelegatePass()] if hasattr(first, "GetDelegatePass") else []
     members: Any = first.GetPasses() if hasattr(first, "GetPasses") else None
     count = 0 if members is None else members.GetNumberOfItems()
     behind += [members.GetItemAsObject(i) for i in range(count)]
-    return {first.GetClassName()}.union(*map(_passes, behind))
+    there = (each for each in behind if each is not None)
+    return {first.GetClassName()}.union(*map(_passes, there))
 
 
 def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:
