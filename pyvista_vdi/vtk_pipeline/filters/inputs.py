@@ -168,8 +168,8 @@ class SourceInput(Input):
         return len(self.source.inputs) == 1
 
     def vdi(self) -> VDI | None:
-        """Return the VDI, brought up to date."""
-        return as_vdi(self.source.GetVDI())
+        """Return the VDI of the data at the source's input, brought up to date."""
+        return self.source.UpdateFromInput()
 
     def last(self) -> VDI | None:
         """Return the VDI made last."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pyvista_vdi.errors import (
+    Cancelled,
     InvalidArgumentError,
     InvalidVolumeError,
     UnsupportedError,
@@ -76,6 +77,7 @@ class Request:
     device: Any
     metadata: dict[str, Any]  # what is added to the VDI's
     content: Any = field(repr=False)  # equal where what is generated from is, the view apart
+    covered: bool = True  # as far as coverage asks
 
     @property
     def key(self) -> Any:
@@ -196,6 +198,7 @@ class VDISource(OptionMethods, Classifying):
         self._table_key: Any = None
         self._vdi: VDI | None = None
         self._request: Request | None = None
+        self._executed: Volume | None = None  # what the output was made of
         self.inputs: weakref.WeakSet[Any] = weakref.WeakSet()  # mappers' inputs that draw this
 
     # What is set
@@ -298,9 +301,8 @@ class VDISource(OptionMethods, Classifying):
         # Somebody may have brought the input to another time, and this asks for none: VTK's filters
         # look at the data of their input only when they have reason to execute
         known = isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0
-        if known and self._request and wanted_time(self.GetOutputInformation(0)) is None:
-            before = self._request.volume
-            if self._read(data) is not before:
+        if known and self._executed and wanted_time(self.GetOutputInformation(0)) is None:
+            if self._read(data) is not self._executed:
                 self.Modified()
         super().Update(*args)
 
@@ -337,7 +339,7 @@ class VDISource(OptionMethods, Classifying):
                 "this VDISource keeps values, and a mapper draws colours: give add_vdi or "
                 "VDIToImage what it makes, or VDIMapper GetVDI().classified(cmap=..., opacity=...)"
             )
-        return self._make_request(self.UpdateInput(), view, warn=False)
+        return self._make_request(self.UpdateInput(), view)
 
     def TakeVDI(self, vdi: VDI, request: Request, *, view: bool = True) -> None:
         """Take a VDI that was made of a request elsewhere, as if it had been made here.
@@ -352,12 +354,20 @@ class VDISource(OptionMethods, Classifying):
     def MakeVDI(self, request: Request) -> VDI:
         """Return the VDI of a request, made now; what the source has made stays."""
         self.SetAbortExecute(0)  # of this VDI nobody has said it yet
+        if not request.covered:
+            warn_external(
+                "coverage='bounds' needs the eye outside the volume, with all of it in front: the "
+                "VDI covers the current view only (coverage='view'); move the camera back and "
+                "regenerate for the whole volume"
+            )
         asked = request.generation.replace(progress=self._advance)
         if request.deferral.deferred:
             return generate_deferred(asked, request.deferral)  # type: ignore[return-value]
         if request.target is None:
             return generate_vdi(asked)
-        return generate_to_target(asked, request.target)
+        vdi = generate_to_target(asked, request.target)
+        warn_missed(vdi)
+        return vdi
 
     def GetVolume(self) -> Volume:
         """Return the volume at the input, read again only if it has changed; raises if none is."""
@@ -393,6 +403,16 @@ class VDISource(OptionMethods, Classifying):
         self.GetInputAlgorithm(0, 0).Update()
         return self.GetInputDataObject(0, 0)
 
+    def UpdateFromInput(self) -> VDI:
+        """Return the VDI of the data that are at the input by now.
+
+        They are those of before where an algorithm further up has failed, which :meth:`GetVDI`
+        raises.
+        """
+        self._make(self.MakeRequest())
+        assert self._vdi is not None
+        return self._vdi
+
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the output's extent: one point per list, as far as it is known before."""
         self.picture_size = self.GetWindowSize() or (1, 1)
@@ -401,18 +421,21 @@ class VDISource(OptionMethods, Classifying):
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
-        request = self._make_request(vtkDataObject.GetData(inputs[0], 0), None, warn=True)
-        if self._vdi is None or self._request is None or request.key != self._request.key:
-            self._vdi = self.MakeVDI(request)
-            self._request = request
-            if request.target is not None:
-                warn_missed(self._vdi)
+        request = self._make_request(vtkDataObject.GetData(inputs[0], 0), None)
+        self._make(request)
+        assert self._vdi is not None
         vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(self._vdi))
+        self._executed = request.volume
         # Coverage and a dial have chosen it only now
         announce(outputs, self._vdi.window_size)
         ask_for_all([outputs])
 
-    def _make_request(self, image: Any, view: View | None, *, warn: bool) -> Request:
+    def _make(self, request: Request) -> None:
+        """Make a request's VDI, unless it is the one that was made last."""
+        if self._request is None or request.key != self._request.key:
+            self._vdi, self._request = self.MakeVDI(request), request
+
+    def _make_request(self, image: Any, view: View | None) -> Request:
         prop, deferral, target = self.GetVolumeProperty(), self.GetDeferral(), self.GetDial()
         camera = self._camera if view is None else view.camera
         window_size = self.GetWindowSize() if view is None else view.size
@@ -443,23 +466,19 @@ class VDISource(OptionMethods, Classifying):
         generating = (camera, window_size)
         if placed is not None:
             generating = (camera.replace(model_transform=placed), window_size)
+        wide = None
         if self.GetCoverage() == "bounds":
             # The corners of the box of points, model frame: tighter than bounds if rotated
             corners = np.zeros((8, 3))
             for at, corner in zip(bounds_corners(image.GetExtent()).tolist(), corners, strict=True):
                 image.TransformIndexToPhysicalPoint(*map(int, at), corner)
             wide = covering_view(*generating, corners)
-            generating = wide or generating
-            if warn and wide is None:
-                warn_external(
-                    "coverage='bounds' needs the eye outside the volume, with all of it in "
-                    "front: the VDI covers the current view only (coverage='view'); move the "
-                    "camera back and regenerate for the whole volume"
-                )
+        covered = wide is not None or self.GetCoverage() == "view"
+        generating = wide or generating
         metadata, device = self.GetMetadata(), self.GetDevice()
         content = (self._volume_key, table, options, placed, deferral, target, device, metadata)
         metadata = {"scalars": volume.name, **metadata}
-        settings = (options, deferral, target, device, metadata, content)
+        settings = (options, deferral, target, device, metadata, content, covered)
         return Request(volume, table, screen, generating, *settings)
 
     def _read(self, image: Any) -> Volume:
@@ -471,6 +490,8 @@ class VDISource(OptionMethods, Classifying):
         # The image's time is newer than its arrays', whose values may have been written in place
         key = (array.GetAddressAsString(""), image.GetMTime())
         if self._volume is None or key != self._volume_key:
+            if self.GetInputAlgorithm(0, 0).CheckAbort():
+                raise Cancelled("what is before VDISource was aborted: its data are not whole")
             self._volume, self._volume_key = volume_from_vtk(image, *chosen), key
         return self._volume
 
