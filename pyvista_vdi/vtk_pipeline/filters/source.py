@@ -301,9 +301,9 @@ class VDISource(OptionMethods, Classifying):
         # Somebody may have brought the input to another time, and this asks for none: VTK's filters
         # look at the data of their input only when they have reason to execute
         known = isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0
-        if known and self._executed and wanted_time(self.GetOutputInformation(0)) is None:
-            if self._read(data) is not self._executed:
-                self.Modified()
+        asked = known and self._executed and wanted_time(self.GetOutputInformation(0)) is None
+        if asked and self._read(data) is not self._executed:
+            self.Modified()
         super().Update(*args)
 
     def GetVDI(self) -> VDI:
