@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from packaging.version import Version
 
-from pyvista_vdi.errors import MissingDependencyError, UnsupportedError
+from pyvista_vdi.errors import MissingDependencyError
 
 if TYPE_CHECKING:  # what editors show; with mypy every name is Any, by __getattr__
     from vtkmodules.all import *
@@ -128,17 +128,3 @@ def explain_import_error(error: ImportError) -> MissingDependencyError:
         f'"{BACKEND}[all]", or choose another build by the environment variable '
         "PYVISTA_VTK_BACKEND=vtk"
     )
-
-
-def require_this_build(kind: type) -> None:
-    """Refuse a class of another build of VTK, by name; what is none of VTK's passes."""
-    this = __getattr__("vtkObjectBase")
-    base = next((each for each in kind.__mro__ if each.__name__ == "vtkObjectBase"), this)
-    if base is not this:
-        other = base.__module__.partition(".")[0]
-        raise UnsupportedError(
-            f"the {kind.__name__} is an object of {other}, which {BACKEND}, the VTK that this "
-            f"process uses, cannot take: make it with {BACKEND}, of NumPy arrays for example, or "
-            "set the environment variable PYVISTA_VTK_BACKEND="
-            f"{'vtk' if other == 'vtkmodules' else other} before PyVista is imported"
-        )

@@ -25,7 +25,7 @@ from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_imag
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import View, camera_of
-from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData
+from pyvista_vdi.vtk_pipeline.vtk import vtkImageData
 
 #: What two equal sizes of pixels differ by at most.
 ROUNDING = 1e-6
@@ -186,11 +186,12 @@ class SourceInput(Input):
         return bounds_before(self.source)
 
     def stamp(self) -> Any:
-        """Return the newest time stamp of all that it depends on."""
+        """Return the time stamps of all that it depends on, and a shaded volume's lights."""
         source, prop = self.source, self.source.GetVolumeProperty()
         data = None if self.port is None else source.UpdateInput()
-        there = (source, data, prop)
-        return max(thing.GetMTime() for thing in there if thing is not None)
+        stamps = [thing and thing.GetMTime() for thing in (source, data, prop)]
+        lights = source.GetLights() if prop is not None and prop.GetShade() else None
+        return *stamps, lights, source.placed if lights and lights.of_scene else None
 
     def note_scene(self, renderers: Sequence[Any], model_transform: NDArray[np.float64]) -> None:
         """Note a renderer that shows it, for its lights, unless none does, and where it stands."""
@@ -199,8 +200,7 @@ class SourceInput(Input):
         if self.of_scene and not known and (self.alone or lit_by is None):
             source.lit_by.Set(renderers[0] if renderers else None)
         if self.alone:
-            source.SetPlace(model_transform)
-        source.CheckLights()
+            source.placed = tuple(map(tuple, model_transform.tolist()))
 
     def keep_lights(self, closed: Sequence[Any]) -> None:
         """Keep the lights of the renderer that lights it, if that is one of those that close."""
@@ -395,7 +395,6 @@ def input_of(data: Any) -> Input:
     show = registry.shown(data)
     if show is not None:
         return show(data)  # type: ignore[no-any-return]
-    require_this_build(type(data))
     raise InvalidVDIError(
         f"a VDIMapper draws a VDI, its canonical image, a series, a set or a VDISource's output; "
         f"got {type(data).__name__}: put a VDISource between a volume and the mapper"
@@ -404,7 +403,6 @@ def input_of(data: Any) -> Input:
 
 def input_of_port(port: Any) -> Input:
     """Return what to draw for an output port."""
-    require_this_build(type(port))
     producer = port.GetProducer()
     if isinstance(producer, VDISource):
         return SourceInput(producer)
