@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVDIError
-from pyvista_vdi.generation.deferred import warn_of_range
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
@@ -182,8 +181,13 @@ class SourceInput(Input):
         return self.source.GetInputConnection(0, 0) if connected else None
 
     def bounds(self) -> tuple[float, ...] | None:
-        """Return the bounds of the volume, brought up to date; ``None`` where there is none."""
-        return bounds_before(self.source)
+        """Return the bounds of the volume, brought up to date; ``None`` where there is none.
+
+        VTK's mappers do so, too, because many filters announce other bounds than they give.
+        """
+        data: Any = None if self.port is None else self.source.UpdateInput()
+        known = isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0
+        return tuple(data.GetBounds()) if known else None
 
     def stamp(self) -> Any:
         """Return the time stamps of all that it depends on, and a shaded volume's lights."""
@@ -308,36 +312,39 @@ class SourceInput(Input):
 class DeferredInput(Input):
     """Values that a volume property classifies, anew when it has changed; no volume is needed.
 
-    Those of a source are made once, of the first view that there is; then the volume is let go of.
+    Values that are not made yet are what ``values`` returns for the first view that there is, or
+    that of the ``camera``; their ``bounds`` are known before.
     """
 
-    def __init__(self, values: DeferredVDI | VDISource, prop: Any) -> None:
+    def __init__(
+        self,
+        values: DeferredVDI | Callable[[View], DeferredVDI],
+        prop: Any,
+        bounds: tuple[float, ...] | None = None,
+        camera: Camera | None = None,
+    ) -> None:
         super().__init__()
-        self._values, self.prop = values, prop
+        self.prop, self._values, self._bounds, self._camera = prop, values, bounds, camera
+        self._view: View | None = None
         self._made_at: Any = None
         self._look: TransferFunction | None = None  # of the VDI that was made last
 
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
         """The values, made now if they are not yet; ``None`` without a view to make them of."""
-        source: Any = self._values
-        if isinstance(source, VDISource):
-            if source.GetWindowSize() is None:
+        if not isinstance(self._values, DeferredVDI):
+            if self._view is None:
                 return None
-            made: Any = source.GetVDI()
-            warn_of_range(made, source.GetVolume())
-            self._values = made
-        return self._values  # type: ignore[return-value]
+            self._values = self._values(self._view)
+        return self._values
 
     def set_view_if_missing(
         self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
     ) -> None:
         """Take the view of a frame, or a camera that was given, as that of the values."""
-        source = self._values
-        if isinstance(source, VDISource) and source.GetWindowSize() is None:
-            given = source.GetCamera() or camera_of(camera, model_transform)
-            source.SetCamera(given.replace(model_transform=model_transform))
-            source.SetWindowSize(size)
+        if self._view is None:
+            given = self._camera or camera_of(camera, model_transform)
+            self._view = View(given.replace(model_transform=model_transform), size)
 
     def on_devices(self) -> list[Any]:
         """Return the VDI and its values."""
@@ -345,11 +352,8 @@ class DeferredInput(Input):
 
     def vdi(self) -> VDI | None:
         """Return the VDI that the property makes of the values now; ``None`` without a view."""
-        values = self.deferred
-        if values is None:
-            return None
-        stamp = self.stamp()
-        if self._vdi is None or self._made_at != stamp:
+        values, stamp = self.deferred, self.stamp()
+        if values is not None and (self._vdi is None or self._made_at != stamp):
             look = transfer_function_from_property(self.prop)
             if self._vdi is None or self._look != look:  # the time stamp alone says little
                 self._vdi, self._look = classify_on_device(values, look), look
@@ -358,27 +362,17 @@ class DeferredInput(Input):
 
     def classified_by(self, prop: Any) -> Input:
         """Return one of the same values: whoever shares this one keeps the property."""
-        return DeferredInput(self._values, prop)
+        other = DeferredInput(self._values, prop, self._bounds, self._camera)
+        other._view = self._view
+        return other
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds in the model frame."""
-        values = self._values
-        return bounds_before(values) if isinstance(values, VDISource) else values.bounds
+        return self._values.bounds if isinstance(self._values, DeferredVDI) else self._bounds
 
     def stamp(self) -> Any:
         """Return the time stamp of the property and its functions."""
         return self.prop.GetMTime()
-
-
-def bounds_before(source: VDISource) -> tuple[float, ...] | None:
-    """Return the bounds of a source's volume, model frame; ``None`` where there is no volume.
-
-    Its input is brought up to date, as by VTK's mappers, because many filters announce other
-    bounds than they give; no VDI is made.
-    """
-    data: Any = source.UpdateInput() if source.GetNumberOfInputConnections(0) > 0 else None
-    known = isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0
-    return tuple(data.GetBounds()) if known else None
 
 
 def input_of(data: Any) -> Input:

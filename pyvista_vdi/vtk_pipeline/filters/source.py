@@ -13,17 +13,14 @@ from pyvista_vdi.errors import (
     Cancelled,
     InvalidArgumentError,
     InvalidVolumeError,
-    UnsupportedError,
     warn_external,
 )
-from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_range, one_of
+from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import (
-    Deferral,
     GenerationOptions,
     GenerationRequest,
     QualityTarget,
@@ -49,11 +46,7 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_to_image,
     volume_from_vtk,
 )
-from pyvista_vdi.vtk_pipeline.filters.properties import (
-    INTERPOLATION,
-    check_property,
-    transfer_function_from_property,
-)
+from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 from pyvista_vdi.vtk_pipeline.filters.view import View
 from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData, vtkWeakReference
 
@@ -67,7 +60,6 @@ class Request:
     screen: View
     generating: tuple[Camera, tuple[int, int]]  # V_O and its window, after coverage
     options: GenerationOptions
-    deferral: Deferral
     target: QualityTarget | None
     device: Any
     metadata: dict[str, Any]  # what is added to the VDI's
@@ -93,14 +85,6 @@ class Request:
             self.device,
             metadata=metadata,
         )
-
-
-def checked_deferral(*given: Any, **named: Any) -> Deferral:
-    """Return when scalars are classified; a pair in it tells whether another is the same."""
-    found = Deferral(*given, **named)
-    if found.value_range is None:
-        return found
-    return replace(found, value_range=as_range(found.value_range))
 
 
 class VDISource(SceneAlgorithm):
@@ -152,14 +136,6 @@ class VDISource(SceneAlgorithm):
         "chooses the lists of the window, ``MaxSupersegments`` and ``Precision``, which have to "
         "have their defaults, as ``Tolerance`` has to; ``GetVDI().metadata['dial']`` says what",
         check=lambda *given, **named: QualityTarget(*given, **named) or None,
-    )
-    SetDeferral, GetDeferral = accessors(
-        "deferral",
-        "when scalars are classified, by the arguments of ``Deferral``; without any, as the VDI is "
-        "made. ``'deferred'`` makes a ``DeferredVDI``: of the volume property, which may be left "
-        "out, only the interpolation counts then",
-        Deferral(),
-        checked_deferral,
     )
     SetMetadata, GetMetadata = accessors(
         "metadata", "entries to add to the VDI's metadata", {}, dict
@@ -225,7 +201,7 @@ class VDISource(SceneAlgorithm):
     # What is made
 
     def GetVDI(self) -> VDI:
-        """Return the VDI, brought up to date; a ``DeferredVDI`` if :meth:`SetDeferral` says so.
+        """Return the VDI, brought up to date.
 
         Raises
         ------
@@ -252,11 +228,6 @@ class VDISource(SceneAlgorithm):
         This brings the pipeline before the source up to date, and generates nothing; it raises what
         :meth:`GetVDI` would raise before it generates.
         """
-        if self.GetDeferral().deferred:
-            raise UnsupportedError(
-                "this VDISource keeps values, and a mapper draws colours: give add_vdi or "
-                "VDIToImage what it makes, or VDIMapper GetVDI().classified(cmap=..., opacity=...)"
-            )
         return self._make_request(self.UpdateInput(), view)
 
     def TakeVDI(self, vdi: VDI, request: Request, *, view: bool = True) -> None:
@@ -279,8 +250,6 @@ class VDISource(SceneAlgorithm):
                 "regenerate for the whole volume"
             )
         asked = request.generation.replace(progress=self._advance)
-        if request.deferral.deferred:
-            return generate_deferred(asked, request.deferral)  # type: ignore[return-value]
         if request.target is None:
             return generate_vdi(asked)
         vdi = generate_to_target(asked, request.target)
@@ -350,28 +319,24 @@ class VDISource(SceneAlgorithm):
         return self._vdi
 
     def _make_request(self, image: Any, view: View | None = None) -> Request:
-        prop, deferral, target = self.GetVolumeProperty(), self.GetDeferral(), self.GetDial()
+        prop, target = self.GetVolumeProperty(), self.GetDial()
         camera = self.GetCamera() if view is None else view.camera
         window_size = self.GetWindowSize() if view is None else view.size
         needed = {
             "camera (SetCamera)": camera,
             "window size (SetWindowSize)": window_size,
-            "volume property (SetVolumeProperty)": prop or deferral.deferred or None,
+            "volume property (SetVolumeProperty)": prop,
         }
         missing = [what for what, value in needed.items() if value is None]
         if camera is None or window_size is None or missing:
             raise InvalidArgumentError(f"VDISource has no {', no '.join(missing)}")
         volume = self._read(image)
-        if prop is None or deferral.deferred:
-            deferral.refuse_target(target or QualityTarget())
-            table = _unclassified(prop)
-        else:
-            # Take the property's functions over the volume's scalars, the same until they change
-            key = (self._volume_key, prop.GetMTime())
-            if self._table is None or key != self._table_key:
-                self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
-                self._table_key = key
-            table = self._table
+        # Take the property's functions over the volume's scalars, the same until they change
+        key = (self._volume_key, prop.GetMTime())
+        if self._table is None or key != self._table_key:
+            self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
+            self._table_key = key
+        table = self._table
         lights = self.GetLights() if table.shading else Lights()
         options = replace(self.GetOptions(), lights=lights)
         # Where lights of the scene shine on it, the volume is lit where it stands now
@@ -388,9 +353,9 @@ class VDISource(SceneAlgorithm):
             wide = covering_view(*generating, corners)
             covered, generating = wide is not None, wide or generating
         metadata, device = self.GetMetadata(), self.GetDevice()
-        content = (self._volume_key, table, options, placed, deferral, target, device, metadata)
+        content = (self._volume_key, table, options, placed, target, device, metadata)
         metadata = {"scalars": volume.name, **metadata}
-        settings = (options, deferral, target, device, metadata, content, covered)
+        settings = (options, target, device, metadata, content, covered)
         return Request(volume, table, screen, generating, *settings)
 
     def _read(self, image: Any) -> Volume:
@@ -412,19 +377,6 @@ class VDISource(SceneAlgorithm):
         progress = self.GetProgressCallback()
         goes_on = progress is None or progress(fraction) is not False
         return goes_on and not self.GetAbortExecute()
-
-
-def _unclassified(prop: Any) -> TransferFunction:
-    """Return what stands for the transfer function where values are kept, of a property or None."""
-    if prop is None:
-        return unclassified("nearest")
-    check_property(prop)
-    if prop.GetShade():
-        raise UnsupportedError(
-            "the volume property is shaded, which needs gradients, and a deferred VDI keeps values "
-            "alone: call ShadeOff(), or leave classification='deferred' out"
-        )
-    return unclassified(INTERPOLATION[prop.GetInterpolationType()])
 
 
 def _option(name: str, what: str) -> Any:
