@@ -141,13 +141,9 @@ class SourceInput(Input):
         self._camera: Camera | None = None  # what frames gave, which nobody has set
         self._size: tuple[int, int] | None = None
 
-    def separate(self) -> SourceInput:
+    def shared(self) -> SourceInput:
         """Return an input from a source of its own, with the same settings and VDI."""
-        return self.shared(self.source.Copy())
-
-    def shared(self, source: VDISource | None = None) -> SourceInput:
-        """Return an input from the same source, or from another one that is alike."""
-        other = SourceInput(source or self.source)
+        other = SourceInput(self.source.Copy())
         other._camera, other._size, other.of_scene = self._camera, self._size, self.of_scene
         return other
 
