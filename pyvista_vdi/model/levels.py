@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.volume import Geometry
+from pyvista_vdi.model.volume import Grid
 
 #: How far beyond a plane a corner may lie by rounding; the volume is of size 1, planes of norm 1.
 _ROUNDING = 1e-9
@@ -15,7 +15,7 @@ _ROUNDING = 1e-9
 _COARSER = 1.01
 
 
-def nearest_depth(grid: Geometry, camera: Camera, window_size: Sequence[int]) -> float | None:
+def nearest_depth(grid: Grid, camera: Camera, window_size: Sequence[int]) -> float | None:
     """Return the view depth of the visible part of a grid's box that is nearest to the eye.
 
     ``grid``: of a volume. ``camera``: V_O. ``window_size``: lists of V_O along x and y. Returns:
@@ -38,7 +38,7 @@ def nearest_depth(grid: Geometry, camera: Camera, window_size: Sequence[int]) ->
     return max(0.0, float((corners @ to_view[2, :3] + to_view[2, 3]).min()))
 
 
-def required_level(levels: Sequence[Geometry], camera: Camera, window_size: Sequence[int]) -> int:
+def required_level(levels: Sequence[Grid], camera: Camera, window_size: Sequence[int]) -> int:
     """Return the level that a view requires.
 
     It is the coarsest whose voxels are still as fine as half a list's width where the volume is
