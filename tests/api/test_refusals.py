@@ -18,11 +18,11 @@ CAMERA = pvdi.Camera((3, 3, 30), (3, 3, 3), (0, 1, 0))
 VOLUME = pvdi.Volume((np.arange(343.0, dtype=np.float32) % 11).reshape(7, 7, 7))
 VDI = pvdi.VDI(CAMERA, (1, 1), [0, 1], [26], [32], [[1, 0, 0]], [1], (0, 6, 0, 6, 0, 6))
 PLANES = r"clipping_planes must be \(k, 6\) finite"
-EDGES = "between 1 and 65536 pixels along each edge; got"
+EDGES = "from 1 to 65536 whole pixels each; got"
 
 #: Options, a value of each that is wrong, and what is said.
 WRONG = [
-    ("window_size", (0, 9), f"{EDGES} 0 x 9"),
+    ("window_size", (0, 9), rf"{EDGES} \(0, 9\)"),
     ("window_size", (12.5, 9), r"whole pixels each; got \(12.5, 9\)"),
     ("window_size", "ab", "whole pixels each; got 'ab'"),
     ("camera", "xyz", "expected a pyvista_vdi.Camera, a vtkCamera"),

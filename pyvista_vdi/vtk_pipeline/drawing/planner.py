@@ -15,10 +15,9 @@ from typing import Any, Literal, TypeAlias
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidVolumeError, VDIError
-from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.view import View
+from pyvista_vdi.model.view import View, coverage
 from pyvista_vdi.quality.costs import Costs
 from pyvista_vdi.quality.plan import (
     SETTLED,

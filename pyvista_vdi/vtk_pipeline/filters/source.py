@@ -20,7 +20,6 @@ from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_range, one_of
-from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import (
     Deferral,
@@ -31,6 +30,7 @@ from pyvista_vdi.model.options import (
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, LightsLike
 from pyvista_vdi.model.vdi import VDI, screen_metadata
+from pyvista_vdi.model.view import bounds_corners, covering_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.targets import generate_to_target, warn_missed
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
