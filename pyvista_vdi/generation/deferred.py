@@ -101,7 +101,7 @@ def generate_deferred(
     metadata: dict[str, Any] = dict(made.metadata)
     for name in ("transfer_function", "opacity_unit_distance", "view_cone"):
         metadata.pop(name)
-    if volume.chunks is None:  # else all would be read for it
+    if not volume.chunked:  # else all would be read for it
         metadata["volume"] = {**metadata["volume"], "scalar_range": list(volume.finite_range())}
     arrays = made.arrays._replace(color=color, optical_depth=spread)
     lists = with_arrays(made, arrays, metadata=metadata)
@@ -147,7 +147,7 @@ def kept_range(
 
 def warn_of_range(kept: DeferredVDI, volume: Volume) -> None:
     """Warn where a VDI's range of values holds none of a volume's, or all in a small part of it."""
-    if volume.chunks is not None:  # nothing is read for it
+    if volume.chunked:  # nothing is read for it
         return
     low, high = kept.value_range
     if not kept.n_supersegments:

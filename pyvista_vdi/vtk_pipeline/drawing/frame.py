@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.quality.costs import RenderMode, rise
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, renderer_view, size_of
