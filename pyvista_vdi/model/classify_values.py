@@ -5,15 +5,14 @@ On a device: ``lib/values.cl``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import UnsupportedError, warn_external
-from pyvista_vdi.model.checks import as_range
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.deferred import DeferredVDI, Floats
 from pyvista_vdi.model.packing import Arrays
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
@@ -40,7 +39,7 @@ def classify(
 
     The opacity of a step of the march, and its colour weighted by opacity, are their means over the
     values of :func:`spread_of_values`. The VDI's arrays are made when they are asked for, by
-    ``media`` if it is given; a raycast asks for none. Errors and warnings are those of
+    ``media`` if it is given; a raycast asks for none. Errors are those of
     :meth:`DeferredVDI.classified`.
     """
     for name, asked in (
@@ -52,7 +51,6 @@ def classify(
                 f"{name} needs gradients, which a DeferredVDI does not keep: leave it out, or "
                 "generate with the transfer function and classification='baked'"
             )
-    _warn_outside(deferred, transfer_function)
 
     # A step's opacity, and the colour times it, at the low end of the range and in cells of it
     low, high = deferred.value_range
@@ -156,33 +154,6 @@ def _integral(integrals: Floats, place: Floats) -> Floats:
     cell = np.minimum(place.astype(np.int64), CELLS - 1)
     share = (place - cell)[:, np.newaxis]
     return integrals[cell] * (1 - share) + integrals[cell + 1] * share
-
-
-def _warn_outside(deferred: DeferredVDI, transfer_function: TransferFunction) -> None:
-    """Warn where a transfer function shows values that are not kept, with their share."""
-    volume = deferred.metadata.get("volume")
-    stored = volume.get("scalar_range") if isinstance(volume, Mapping) else None
-    least, largest = as_range(stored or transfer_function.scalar_range)
-    if not (np.isfinite(least) and np.isfinite(largest) and least < largest):
-        return
-    low, high = deferred.value_range
-    # Sample at the function's nodes, too, which may span a small part of the volume's range
-    first, last = transfer_function.scalar_range
-    nodes = np.linspace(first, last, len(transfer_function.opacities))
-    places = np.concatenate([np.linspace(least, largest, 4097), nodes.clip(least, largest)])
-    values = np.unique(places)
-    if len(values) < 2:
-        return
-    opacity = looked_up(transfer_function, values)[1] * np.gradient(values)
-    kept = (values >= low) & (values <= high)
-    outside = opacity[~kept].sum()
-    if outside > 1e-3 * opacity.sum():
-        warn_external(
-            f"the transfer function shows values outside {low:g} to {high:g}, which this "
-            f"VDI does not keep: {outside / opacity.sum():.1%} of its opacity from "
-            f"{least:g} to {largest:g}; generate with a wider value_range, or lower the opacity "
-            "there"
-        )
 
 
 def looked_up(transfer_function: TransferFunction, values: Floats) -> tuple[Floats, Floats]:

@@ -182,11 +182,6 @@ class DeferredVDI(Lists):
         InvalidArgumentError, MissingDependencyError
             As for :func:`pyvista_vdi.generate`.
 
-        Warns
-        -----
-        VDIWarning
-            If the transfer function shows values outside :attr:`value_range`, with their share.
-
         Examples
         --------
         >>> import pyvista_vdi as pvdi

@@ -15,8 +15,7 @@ _ENTRIES = 256
 _POINTS = {
     "ct-bone": "150 #a0522d 0, 300 #d9a577 0.1, 700 #f2e3c6 0.5, 1600 #ffffff 0.9",
     # The surface against air
-    "ct-skin": "-500 #8a5a44 0, -250 #d9a184 0.2, 0 #eec0a4 0.5, 400 #f7ead9 0.7, "
-    "1500 #ffffff 0.9",
+    "ct-skin": "-500 #8a5a44 0, -250 #d9a184 0.2, 0 #eec0a4 0.5, 400 #f7ead9 0.7, 1500 #ffffff 0.9",
     # Faintly, around bone
     "ct-muscle": "-20 #7a2a20 0, 30 #b5493a 0.1, 80 #cf6a55 0.16, "
     "180 #dfa97c 0.12, 600 #f2e3c6 0.5, 1500 #ffffff 0.9",

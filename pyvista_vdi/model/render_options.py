@@ -157,12 +157,6 @@ class DrawingOptions(Options):
         "own levels of detail; 0: every frame is full.",
         check=Number("a number of frames per second, 0 or above"),
     )
-    adjust_multi_samples: bool = option(
-        True,
-        "go without multisampling while the view moves and frames would be late",
-        "At rest, and in pictures that are kept, it is as the plotter has it.",
-        setting=True,
-    )
     regenerate: Policy = option(
         "auto",
         "when a view gets a VDI of its own",

@@ -301,7 +301,7 @@ class VDIActorMethods:
         rate: float = RATE,
         *,
         loop: bool = True,
-        memory_limit: float | str | None = None,
+        memory_limit: int | None = None,
     ) -> None:
         """Show one step after the other, from the one that is shown, while the view can be turned.
 
@@ -316,8 +316,8 @@ class VDIActorMethods:
             Steps per second.
         loop : bool
             Whether the first step follows the last; otherwise that is the end.
-        memory_limit : float or str, optional
-            Bytes that decoded steps may take, or as ``"2 GiB"``; 1 GiB by default. Those that are
+        memory_limit : int, optional
+            Bytes that decoded steps may take; 1 GiB by default. Those that are
             kept need not be decoded in the next round.
 
         Raises

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVDIError
-from pyvista_vdi.generation.deferred import warn_of_range
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
@@ -324,9 +323,7 @@ class DeferredInput(Input):
         if isinstance(source, VDISource):
             if source.GetWindowSize() is None:
                 return None
-            made: Any = source.GetVDI()
-            warn_of_range(made, source.GetVolume())
-            self._values = made
+            self._values = source.GetVDI()
         return self._values  # type: ignore[return-value]
 
     def set_view_if_missing(
