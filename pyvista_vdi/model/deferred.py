@@ -78,7 +78,6 @@ class DeferredVDI(Lists):
         for name in ("camera", "window_size", "bounds", "depth_origin", "metadata"):
             setattr(self, name, getattr(lists, name))
         self._lists = lists
-        lists.kept = self.about
 
     @property
     def lists(self) -> VDI:
@@ -121,21 +120,6 @@ class DeferredVDI(Lists):
         """Steps of the march through what each supersegment holds, float32 (n,)."""
         length = lengths_of(self._lists) / self.sample_distance
         return (length * self.share).astype(np.float32)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays in memory."""
-        return self._lists.nbytes
-
-    @property
-    def precision(self) -> str:
-        """What a supersegment takes in a file: see :meth:`with_precision`."""
-        return self._lists.precision
-
-    def equals(self, other: object) -> bool:
-        """Whether all arrays, the view, the bounds and the range are the same to the last bit."""
-        same = isinstance(other, DeferredVDI) and self.about == other.about
-        return same and self._lists.equals(other.lists)  # type: ignore[attr-defined]
 
     def with_precision(self, precision: str) -> DeferredVDI:
         """Return it with supersegments of fewer bytes: ``"exact"``, ``"8-byte"``.
