@@ -35,12 +35,6 @@ def as_whole(value: Any) -> float:
     return number if number % 1 == 0 else math.nan
 
 
-def not_taken(value: Any) -> type[InvalidArgumentError]:
-    """Return the error by which ``value`` is refused where a number is wanted."""
-    number = isinstance(value, int | float | np.number)
-    return InvalidArgumentError if number else InvalidArgumentTypeError
-
-
 def as_flag(value: Any, name: str) -> bool:
     """Return what is true or false as a bool.
 
@@ -108,22 +102,6 @@ def as_range(values: Any) -> tuple[float, float]:
     except (TypeError, ValueError):
         return math.nan, math.nan
     return as_float(low), as_float(high)
-
-
-def three_wholes(values: Any, what: str, least: int) -> tuple[int, int, int]:
-    """Return three whole numbers, of which none is below the least.
-
-    ``what`` says what they are: the argument's name, and what it means.
-
-    Raises InvalidArgumentError if they are no such numbers.
-    """
-    try:
-        x, y, z = (as_whole(k) for k in values)
-    except (TypeError, ValueError):
-        x = y = z = math.nan
-    if not (x >= least and y >= least and z >= least):
-        raise InvalidArgumentError(f"{what}, three whole numbers from {least}; got {values!r}")
-    return int(x), int(y), int(z)
 
 
 def as_floats(values: Any) -> NDArray[np.float64]:

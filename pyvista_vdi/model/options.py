@@ -161,11 +161,6 @@ class Options:
                 object.__setattr__(self, name, kept)
 
     @classmethod
-    def checked(cls: type[_Record], *given: Any, **named: Any) -> _Record:
-        """Return a record of what a user gave, whatever its types are."""
-        return cls(*given, **named)
-
-    @classmethod
     def of(cls: type[_Record], options: _Record | None, changes: Mapping[str, Any]) -> _Record:
         """Return options with some of them changed, or the defaults; TypeError if one is none."""
         if options is None:
@@ -435,6 +430,4 @@ class GenerationRequest:
         object.__setattr__(self, "camera", Camera.from_any(self.camera))
         object.__setattr__(self, "window_size", check_window_size(self.window_size))
 
-    def replace(self, **changes: Any) -> GenerationRequest:
-        """Return the same request but for some of its fields."""
-        return replace(self, **changes)
+    replace = replace

@@ -45,11 +45,8 @@ class Lists:
     depth_origin: float
     #: How it was made.
     metadata: dict[str, Any]
-
-    @property
-    def lists(self) -> VDI:
-        """The lists in the form of a VDI, for storage: of a VDI itself."""
-        return self  # type: ignore[return-value]
+    #: The lists in the form of a VDI: of a VDI itself.
+    lists: VDI
 
     @property
     def arrays(self) -> Arrays:
@@ -107,7 +104,7 @@ class Lists:
         return (
             type(other) is type(self)
             and all(getattr(self, n, None) == getattr(other, n, None) for n in names)
-            and all(map(np.array_equal, self.arrays, other.arrays))
+            and all(map(np.array_equal, self.arrays, other.arrays))  # type: ignore[arg-type]
         )
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
@@ -205,6 +202,11 @@ class VDI(Lists):
             assert self.late is not None
             self._arrays = _read_only(self.late.arrays())
         return self._arrays
+
+    @property
+    def lists(self) -> VDI:  # type: ignore[override]
+        """The lists in the form of a VDI: itself."""
+        return self
 
     @property
     def packing(self) -> Packed8 | None:
@@ -331,7 +333,8 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
 
 def _read_only(arrays: Arrays) -> Arrays:
     """Return views that cannot be written; the caller's own arrays stay writable."""
-    views = Arrays(*(array.view() for array in arrays))
+    given: Any = arrays
+    views = Arrays(*map(np.ndarray.view, given))
     for view in views:
         view.setflags(write=False)
     return views

@@ -323,8 +323,8 @@ class DeferredInput(Input):
         if isinstance(source, VDISource):
             if source.GetWindowSize() is None:
                 return None
-            self._values = source.GetVDI()
-        return self._values  # type: ignore[return-value]
+            self._values = source = source.GetVDI()
+        return source  # type: ignore[no-any-return]
 
     def set_view_if_missing(
         self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
