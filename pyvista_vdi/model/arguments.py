@@ -103,7 +103,7 @@ class Raw:
     def __init__(self, record: type[Options]) -> None:
         self.declared = record.declared
 
-    def __call__(self, **given: Any) -> dict[str, Any]:
+    def checked(self, **given: Any) -> dict[str, Any]:
         """Return all of the options by their names."""
         return {name: given.get(name, told.default) for name, told in self.declared.items()}
 
@@ -204,7 +204,7 @@ def records_of(
     said = {**(defaults or {}), **_settings(given.pop("settings", None), function, hidden)}
     direct = options if flat else options.keys() - hidden.keys()
     said |= {name: given.pop(name) for name in direct if name in given}
-    return [each(**{n: said[n] for n in each.declared if n in said}) for each in records]
+    return [each.checked(**{n: said[n] for n in each.declared if n in said}) for each in records]
 
 
 def names_of(*records: Any) -> list[str]:

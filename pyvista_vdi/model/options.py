@@ -161,6 +161,11 @@ class Options:
                 object.__setattr__(self, name, kept)
 
     @classmethod
+    def checked(cls: type[_Record], *given: Any, **named: Any) -> _Record:
+        """Return a record of what a user gave, whatever its types are."""
+        return cls(*given, **named)
+
+    @classmethod
     def of(cls: type[_Record], options: _Record | None, changes: Mapping[str, Any]) -> _Record:
         """Return options with some of them changed, or the defaults; TypeError if one is none."""
         if options is None:

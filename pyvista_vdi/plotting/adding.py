@@ -142,7 +142,10 @@ class Addition:
     def checked(cls, **given: Any) -> Addition:
         """Return what was asked for by names of options."""
         return cls(
-            *(each(**{n: given[n] for n in each.declared if n in given}) for each in _RECORDS)
+            *(
+                each.checked(**{n: given[n] for n in each.declared if n in given})
+                for each in _RECORDS
+            )
         )
 
     def __post_init__(self) -> None:

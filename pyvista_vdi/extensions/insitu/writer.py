@@ -203,7 +203,7 @@ class InSitu:
             at = checked_time(at)
             own = Volume(values, self._grid["spacing"], self._grid["origin"]).load()
             index = Number("three whole numbers, the index of a point", whole=True, name="first")
-            first = [*map(index, as_vector(first, "first"))]
+            x, y, z = map(index, as_vector(first, "first"))
             get_runtime(self._device)
             if self._function is None:
                 self._function = self._looks.transfer_function_of(own)
@@ -216,7 +216,9 @@ class InSitu:
         )
         low, high = zip(*self._comm.allgather(ends), strict=True)
         ends = float(np.fmin.reduce(low)), float(np.fmax.reduce(high))
-        grid: Any = SharedGrid(**self._grid, array=own.array, rgba=own.rgba, first=first, ends=ends)
+        grid: Any = SharedGrid(
+            **self._grid, array=own.array, rgba=own.rgba, first=(x, y, z), ends=ends
+        )
         request = GenerationRequest(
             grid,
             self._function,

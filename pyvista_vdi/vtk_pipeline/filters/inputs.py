@@ -312,14 +312,15 @@ class DeferredInput(Input):
 
     def __init__(self, values: DeferredVDI | VDISource, prop: Any) -> None:
         super().__init__()
-        self._values, self.prop = values, prop
+        self._values: Any = values
+        self.prop = prop
         self._made_at: Any = None
         self._look: TransferFunction | None = None  # of the VDI that was made last
 
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
         """The values, made now if they are not yet; ``None`` without a view to make them of."""
-        source: Any = self._values
+        source = self._values
         if isinstance(source, VDISource):
             if source.GetWindowSize() is None:
                 return None
