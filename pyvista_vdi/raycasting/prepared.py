@@ -392,7 +392,7 @@ class KeptValues(PreparedVDI):
         """Return what a transfer function shows: what is transparent is left out."""
         runtime, shown, bundles = self.runtime, copy.copy(self), self.headers.shape[0]
         if runtime.is_cpu:
-            shown.lit = share_lit(self._lists, *self.depths, look.optical_depths)
+            shown.lit = share_lit(self._lists, *self.depths, lambda rows: look.media_of(rows)[1])
         with (
             kept_together() as keep,
             runtime.upload(look.integrals(), "integrals of a transfer function") as table,
