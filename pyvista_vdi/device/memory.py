@@ -412,7 +412,7 @@ class Memory(Turns):
         memory, cl, queue = buffer.used(), self.cl, self.queue
         background = self.thread.worker is not None
         waits, event = background or not later, None
-        data = memoryview(host).cast("B") if host.nbytes else b""
+        data: Any = host.data.cast("B") if host.nbytes else b""
         size = COPY_BYTES if background else max(1, host.nbytes)
         with self.failing(f"{'reading' if to_host else 'writing'} the buffer {buffer.name!r}"):
             for start in range(0, host.nbytes, size):
