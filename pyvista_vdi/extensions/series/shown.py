@@ -12,10 +12,11 @@ from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_float, as_whole, memory_limit_bytes
+from pyvista_vdi.model.checks import as_float, as_whole
 from pyvista_vdi.model.collection import RATE
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import BackgroundThread, Job
 from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
@@ -214,18 +215,18 @@ class SeriesInput(SeveralInput):
         return f"a step is left out: {type(error).__name__}: {error}"
 
     def play(
-        self, rate: float = RATE, *, loop: bool = True, memory_limit: float | str | None = None
+        self, rate: float = RATE, *, loop: bool = True, memory_limit: int | None = None
     ) -> None:
         """Show one step after the other, ``rate`` a second, from the one that is shown.
 
         Time does not wait: steps that are not ready when theirs comes are left out. Without an
         event loop, as off-screen, a frame shows the step of the moment; for a movie set
         :attr:`time`. ``loop``: whether the first step follows the last. ``memory_limit``: bytes
-        that decoded steps may take, or as ``"2 GiB"``; 1 GiB by default.
+        that decoded steps may take; 1 GiB by default.
         """
         if isinstance(rate, bool) or not 0 < as_float(rate) < math.inf:
             raise InvalidArgumentError(f"rate must be steps per second, above 0; got {rate!r}")
-        self.memory = memory_limit_bytes(memory_limit) or self.memory
+        self.memory = MediumOptions(memory_limit=memory_limit).memory_limit or self.memory
         self.rate, self._loop = as_float(rate), bool(loop)
         self.period = period_of(self.rate)
         last = len(self.series) - 1

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.errors import InvalidVolumeError, VDIError
-from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.view import coverage
 from pyvista_vdi.quality.plan import SETTLED
 from pyvista_vdi.quality.rate import FLOOR, reduced
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.quality.costs import RenderMode, rise
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, renderer_view, size_of
@@ -60,7 +60,7 @@ class Frame:
     stand_in: bool = False  # whether the volume stands in for a VDI to come
     bounds: tuple[float, ...] = ()  # of what is seen, model frame
     options: RenderOptions = field(default_factory=RenderOptions)  # planes in the camera's world
-    depth: Image | None = None  # view depth at which rays end, float32 (H, W), top row first
+    depth: Image | None = None  # window depth of what hides it, float32 (H, W), top row first
 
     @classmethod
     def current(
@@ -122,7 +122,8 @@ class Frame:
         """What its image is known by, but for the depth; the quality is in it as the two sizes."""
         blend = tuple((weakref.ref(vdi), weight) for vdi, weight in self.parts)
         of = (self.seen, self.camera, self.size, self.full_size, self.options)
-        return (*of, self.lit_from, blend)
+        numbers = None if self.depth is None else self.projection.tobytes()
+        return (*of, self.lit_from, blend, numbers)
 
     @property
     def way(self) -> RenderMode:
@@ -141,7 +142,11 @@ class Frame:
         (width, height), (wide, high) = self.size, size
         stretch = np.diag([(wide / high) / (width / height), 1.0, 1.0, 1.0])
         camera = self.camera.replace(model_transform=stretch @ self.camera.model_transform)
-        depth = None if self.depth is None else sampled(self.depth, size)
+        depth = self.depth
+        if depth is not None:
+            # The nearest: between a mesh and what is behind it nothing is
+            edges = zip(size[::-1], depth.shape, strict=True)
+            depth = depth[np.ix_(*((2 * np.arange(n) + 1) * full // (2 * n) for n, full in edges))]
         frame = replace(self, size=size, camera=camera, to_view=stretch @ self.to_view, depth=depth)
         if not self.bounds:
             return frame
@@ -160,7 +165,7 @@ class Frame:
             origins = table[:, :3] @ turn.T + self.to_view[:3, 3]
             rows = np.hstack([origins, table[:, 3:] @ np.linalg.inv(turn)]).tolist()
         nearest, farthest = self.depths_of(bounds)
-        near, far = (float(d) for d in self.view_depth(np.array([0.0, 1.0]), background=False))
+        near, far = (float(d) for d in self.view_depth(np.array([0.0, 1.0])))
         slack = _PLANE_SLACK * max(abs(nearest), abs(farthest))
         if near > nearest + slack:
             rows.append([0, 0, -near, 0, 0, -1])
@@ -197,18 +202,16 @@ class Frame:
         low, high = np.clip(rectangle, 0, self.size)
         return float(np.prod(high - low))
 
-    def view_depth(self, z: NDArray[Any], *, background: bool = True) -> NDArray[Any]:
-        """Convert window depth, 0 (near) to 1 (far), to view depth in world units.
+    def view_depth(self, z: NDArray[Any]) -> NDArray[Any]:
+        """Convert window depth, 0 (near) to 1 (far), to view depth in world units, of its dtype.
 
-        Where z is 1 nothing was drawn: with ``background`` its depth is infinite. With rows p and
-        q of the projection matrix, normalised depth is n = (p_2 Z' + p_3) / (q_2 Z' + q_3) at view
-        coordinate Z' = -Z, in perspective as well as in parallel projection; solved for Z' in
-        float64.
+        With rows p and q of the projection matrix, normalised depth is
+        n = (p_2 Z' + p_3) / (q_2 Z' + q_3) at view coordinate Z' = -Z, in perspective as well as in
+        parallel projection; solved for Z' by 1 - z, which is exact where float32 is finest.
         """
-        n = 2.0 * z.astype(np.float64) - 1.0
-        (p2, p3), (q2, q3) = self.projection[:, 2:]
-        depth = -(p3 - n * q3) / (n * q2 - p2)
-        return np.where(z >= 1.0, np.inf, depth) if background else depth
+        (p2, p3), (q2, q3) = self.projection[:, 2:].tolist()
+        w = 1 - z
+        return (q3 - p3 - 2 * q3 * w) / (q2 - p2 - 2 * q2 * w)
 
 
 def consumers(prop: Any) -> list[Any]:
@@ -243,18 +246,6 @@ def tiled(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:
     width, height, x, y = [0], [0], [0], [0]
     renderer.GetTiledSizeAndOrigin(width, height, x, y)
     return (x[0], y[0]), (width[0], height[0])
-
-
-def sampled(depth: Image, size: tuple[int, int]) -> Image:
-    """Return the depth nearest to the centre of each pixel of a coarser image, float32 (H, W).
-
-    Depths must not be averaged: between a mesh and what is behind it nothing is.
-    """
-    rows, columns = (
-        ((2 * np.arange(n) + 1) * full) // (2 * n)
-        for n, full in zip(size[::-1], depth.shape, strict=True)
-    )
-    return np.ascontiguousarray(depth[np.ix_(rows, columns)])
 
 
 def depths_of(to_view: Matrix, bounds: tuple[float, ...]) -> tuple[float, float]:

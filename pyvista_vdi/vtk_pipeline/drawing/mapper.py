@@ -55,22 +55,19 @@ class VDIMapperMethods:
         self.AddObserver("VolumeMapperRenderEndEvent", _on_end)
 
     def own_source(self, what: str) -> VDISource:
-        """Return the source, which no other mapper draws from now on.
+        """Return the source.
 
         Raises
         ------
         UnsupportedError
             If there is none; ``what`` says what cannot be changed.
         """
-        source, shown = self.GetSource(), self.driver.input
-        if source is None or not isinstance(shown, SourceInput):
+        source = self.GetSource()
+        if source is None:
             raise UnsupportedError(
                 f"a VDI without its volume keeps {what}: generate another from the volume"
             )
-        if not shown.alone:
-            shown = shown.separate()
-            self.driver.set_input(shown)
-        return shown.source
+        return source
 
     def SetSampleDistance(self, distance: float) -> None:
         """Set the length of a step, model units, from which the VDI is regenerated."""

@@ -16,11 +16,10 @@ import numpy as np
 
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.errors import Cancelled, InvalidVolumeError, VDIError
-from pyvista_vdi.model.coverage import coverage
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.view import View
+from pyvista_vdi.model.view import View, coverage
 from pyvista_vdi.quality.background import BackgroundThread, Job, vdi_job
 from pyvista_vdi.quality.costs import Costs
 from pyvista_vdi.quality.plan import SETTLED, Made, Making, Plan, Seen, ViewEstimate, lacking, plan

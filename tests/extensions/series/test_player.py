@@ -147,7 +147,7 @@ def test_a_damaged_step_is_told_once_and_left_out(player, steps, clock):
 @pytest.mark.parametrize("kept", [N, 6])
 def test_what_is_kept_is_not_decoded_in_the_next_round(player, steps, clock, kept):
     taken = steps.vdis[0].nbytes * 2.2
-    player.play(rate=10, memory_limit=kept * taken)
+    player.play(rate=10, memory_limit=int(kept * taken))
     player.advance()
     for turn in range(3 * N):
         if turn == 2 * N:
