@@ -138,7 +138,7 @@ def test_one_picture_is_the_volumes_and_no_vdi_is_made():
 def test_pictures_in_which_volumes_overlap_are_drawn_by_vdis():
     assert of(KEPT, joint=True, made=None).show == "exact"
     assert of(KEPT, joint=True).show == "vdi"
-    for poor in ({"view": turned(3)}, {"content": "b"}, {"made": replace(MADE, coverage=0.9)}):
+    for poor in ({"view": turned(3)}, {"content": "b"}):
         assert of(KEPT, joint=True, **poor).show == "exact"
     never = of(KEPT, joint=True, made=None, regenerate="never")
     assert (never.show, never.update) == ("vdi", True)

@@ -128,17 +128,6 @@ class VDIMapperMethods:
         """Return the device as it was set."""
         return self.driver.device
 
-    # In VTK's GPU mapper SetAutoAdjustSampleDistances would draw VTK's own volume into a smaller
-    # framebuffer, so its own switch stays off, and what is called from Python keeps ours.
-
-    def AutoAdjustSampleDistancesOn(self: Any) -> None:
-        """Draw previews."""
-        self.SetAutoAdjustSampleDistances(True)
-
-    def AutoAdjustSampleDistancesOff(self: Any) -> None:
-        """Draw every frame in full."""
-        self.SetAutoAdjustSampleDistances(False)
-
     def ShallowCopy(self: Any, other: Any) -> None:
         """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.
 

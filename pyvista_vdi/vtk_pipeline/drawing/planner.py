@@ -28,13 +28,13 @@ from pyvista_vdi.quality.view_error import (
     angle_from_generating_view,
     magnification,
 )
-from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Matrix, consumers, planes_of
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, consumers, planes_of
 from pyvista_vdi.vtk_pipeline.drawing.images import VolumePicture
 from pyvista_vdi.vtk_pipeline.drawing.overlap import group_of
 from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
-from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, renderer_view, size_of
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import Warnings
 from pyvista_vdi.vtk_pipeline.interaction.window import now
 
@@ -316,13 +316,10 @@ class Planner:
         return self._volume
 
     def _of_this_view(self, source: SourceInput, frame: Frame) -> VDI:
-        """Make and return a VDI of exactly the frame's view, kept unless the frame is a tile."""
-        whole = frame.full_size == frame.view.size
-        tile = None if whole else (frame.camera, frame.size)
-        wanted = source.exact_request(frame.view, tile)
+        """Make and return a VDI of exactly the frame's view."""
+        wanted = source.exact_request(frame.view)
         vdi = source.source.MakeVDI(wanted)
-        if whole:
-            source.source.TakeVDI(vdi, wanted)
+        source.source.TakeVDI(vdi, wanted)
         return vdi
 
     def _update(self, source: Input) -> None:
@@ -413,21 +410,6 @@ class Planner:
         elif seen is not None:
             return source.of_view(source.view_for(*seen))
         return source.last()
-
-    def vdi_of_view(self, renderer: Any, matrix: Matrix) -> VDI | None:
-        """Return a VDI of exactly what a renderer shows of an actor of that matrix, (4, 4).
-
-        It is made beside the one that is there; without the volume, or where nobody but
-        ``actor.regenerate()`` may make another, it is that one.
-        """
-        source = self.input
-        if not isinstance(source, SourceInput) or self.settings.regenerate == "never":
-            return self.vdi_asked_for()
-        source.note_scene(self.renderers, matrix)
-        wanted = source.exact_request(renderer_view(renderer, matrix))
-        made = source.source.GetCurrentRequest()
-        same = made is not None and made.key == wanted.key
-        return source.last() if same else source.source.MakeVDI(wanted)
 
     def vdi_to_pick(self, frame: Frame) -> VDI | None:
         """Return a VDI that has all of what a view shows; without a volume, the one there is."""
