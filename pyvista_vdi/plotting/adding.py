@@ -420,7 +420,6 @@ def _mapper(shown: _Shown, asked: Addition, theme: Any) -> Any:
     mapper.lookup_table = shown.table
     mapper.SetDevice(asked.making.device)
     mapper.SetTargetFrameRate(drawing.target_fps)
-    mapper.SetAutoAdjustMultiSamples(drawing.adjust_multi_samples)
     mapper.SetRegenerate(drawing.regenerate)
     mapper.SetRegenerateBelow(below)
     mapper.SetDraw(drawing.draw)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.model.coverage import bounds_corners
+from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.vtk_pipeline.drawing.screen import fill_viewport
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input

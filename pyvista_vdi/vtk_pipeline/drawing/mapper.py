@@ -26,13 +26,12 @@ COARSEST = 4.0
 def _on_start(mapper: Any, event: str) -> None:
     driver = mapper.driver
     driver.begin(mapper)
-    driver.box.begin(driver.actor)
+    driver.box.begin(driver.actor())
 
 
 def _on_end(mapper: Any, event: str) -> None:
-    driver = mapper.driver
-    driver.end()
-    driver.box.end()
+    mapper.driver.end()
+    mapper.driver.box.end()
 
 
 @with_settings
@@ -95,7 +94,7 @@ class VDIMapperMethods:
         self.SetInputData(args[-1])
 
     def SetInputData(self, data: Any) -> None:
-        """Draw a VDI, its canonical image, a series (:attr:`VDIActor.time`) or a set of VDIs."""
+        """Draw a VDI, its canonical image, a series (:attr:`VDIActor.player`) or a set of VDIs."""
         self._set_input(None if data is None else input_of(data))
 
     SetVDI = SetInputData
@@ -161,7 +160,7 @@ class VDIMapperMethods:
         theirs: Any = other
         shown = other.driver.input
         self.driver.set_input(None if shown is None else shown.shared())
-        self.driver.set(**vars(other.driver.settings))
+        self.driver.settings = other.driver.settings
         cropping = ("Cropping", "CroppingRegionPlanes", "CroppingRegionFlags")
         for name in ("Device", "MaximumImageSampleDistance", *cropping):
             getattr(self, f"Set{name}")(getattr(theirs, f"Get{name}")())

@@ -224,7 +224,7 @@ def vdi_to_image(vdi: VDI | DeferredVDI) -> vtk.vtkImageData:
         bit.
     """
     lists: VDI = vdi.with_precision("exact").lists
-    kept = {} if lists.kept is None else {"deferred": lists.kept}
+    kept = {"deferred": vdi.about} if isinstance(vdi, DeferredVDI) else {}
     width, height = lists.window_size
     image = vtk.vtkImageData()
     image.SetDimensions(width, height, 1)

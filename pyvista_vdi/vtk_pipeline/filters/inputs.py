@@ -47,8 +47,8 @@ class Input:
     remedy = "without its volume it cannot be made anew"
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
     period: int | None = None
-    #: Whether something goes on that the event loop has to look at.
-    busy = False
+    #: Whether one step of a series is shown after the other: the event loop has to look at that.
+    playing = False
 
     def __init__(self, vdi: VDI | None = None, port: Any = None) -> None:
         self._vdi = vdi
