@@ -115,7 +115,7 @@ def generate(
     if deferral.deferred:
         look.require_no_look()
         deferral.refuse_target(target)
-    from pyvista_vdi.generation.deferred import generate_deferred, unclassified, warn_of_range
+    from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 
     request = GenerationRequest(
         volume=read,
@@ -136,7 +136,6 @@ def generate(
     vdi: Any
     if deferral.deferred:
         vdi = generate_deferred(request, deferral, lambda it: generate_anywhere(it, target, client))
-        warn_of_range(vdi, read)
     else:
         vdi = generate_anywhere(request, target, client)
     warn_missed(vdi)

@@ -71,7 +71,7 @@ class Settings(_Fields):  # type: ignore[misc]  # noqa: D101 - made of the optio
     Examples
     --------
     >>> import pyvista_vdi as pvdi
-    >>> pvdi.Settings(tolerance=0.01, memory_limit="2 GiB").given
+    >>> pvdi.Settings(tolerance=0.01, memory_limit=2**31).given
     {{'memory_limit': 2147483648, 'tolerance': 0.01}}
     """
     __signature__ = inspect.signature(_Fields)

@@ -161,7 +161,7 @@ REFUSED = {
         ({"offsets": [0, 2, 1, 3]}, r"must not decrease; offsets\[1\] = 2 is followed by 1"),
         ({"offsets": [0, 1, 2, 2]}, r"offsets\[-1\] = 2 supersegments, but front has 3"),
         ({"offsets": [0, 1.5, 2, 3]}, "offsets must be whole numbers >= 0, .* of float64"),
-        ({"offsets": None}, "offsets must be numbers, in an array; got None"),
+        ({"offsets": None}, "offsets must be whole numbers >= 0, in an array; got None"),
         ({"back": [2.0, 3.0]}, "front has 3, back has 2, color has 3, .*: give each as"),
         ({"color": [0, 0, 0]}, r"color must have shape \(n, 3\); got \(3,\)"),
         ({"front": [[1, 2], [3]]}, "front must be an array of numbers"),
