@@ -104,6 +104,10 @@ class Volume(Grid):
     """
 
     name: str
+    #: Whether every point has a colour of its own; the scalar is the fourth component then.
+    rgba: bool
+    #: Whether the voxels are read chunk by chunk: VDIs are then made block by block.
+    chunked: bool
     #: Of lengths, where a file says it.
     unit: str = ""
     blanked: NDArray[np.uint8] | None
@@ -122,6 +126,8 @@ class Volume(Grid):
             self.array: Any = array
         else:
             self.array = ChunkedArray(array) if is_chunked(array) else _checked_array(array)
+        self.chunked = isinstance(self.array, ChunkedArray)
+        self.rgba = self.array.ndim == 4
         nz, ny, nx = self.array.shape[:3]
         if min(nx, ny, nz) < 2:
             raise InvalidVolumeError(
@@ -190,16 +196,6 @@ class Volume(Grid):
         """
         from_vtk = registry.method("Volume.from_vtk")
         return from_vtk(image, scalars, preference)  # type: ignore[no-any-return]
-
-    @property
-    def rgba(self) -> bool:
-        """Whether every point has a colour of its own; the scalar is the fourth component then."""
-        return self.array.ndim == 4
-
-    @property
-    def chunked(self) -> bool:
-        """Whether the voxels are read chunk by chunk: VDIs are then made block by block."""
-        return isinstance(self.array, ChunkedArray)
 
     def in_view(self, *cameras: Any, window_size: Sequence[int]) -> Volume:
         """Return what of several levels these views require: of one, itself."""
