@@ -48,7 +48,13 @@ SETTINGS: Mapping[str, Option] = {
     "OpacityMultiplier": _DECLARED["opacity_multiplier"],
     "TransmittanceCutoff": _DECLARED["transmittance_cutoff"],
     "TargetFrameRate": _DECLARED["target_fps"],
-    "AutoAdjustMultiSamples": _DECLARED["adjust_multi_samples"],
+    "AutoAdjustMultiSamples": Option(
+        "adjust_multi_samples",
+        True,
+        "whether previews go without multisampling where that makes them late",
+        "All VDIs in a window must allow it; ``GetMultiSamples()`` stays as it was set.",
+        check=partial(as_flag, name="AutoAdjustMultiSamples"),
+    ),
     "ImageSampleDistance": Option(
         "image_distance",
         1.0,
