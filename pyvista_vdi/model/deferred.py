@@ -149,7 +149,7 @@ class DeferredVDI(Lists):
             ``opacity``, ``clim`` (the range of values by default), ``n_colors``,
             ``flip_scalars``, ``log_scale``, ``opacity_unit_distance``; or ``volume_property`` or
             ``transfer_function`` in place of them. And ``device``, where it is computed: by
-            default as for :func:`pyvista_vdi.render`, and on the host where there is none.
+            default as for :func:`pyvista_vdi.render`.
 
         Returns
         -------
@@ -160,7 +160,7 @@ class DeferredVDI(Lists):
         ------
         UnsupportedError
             If the transfer function asks for light or gradient opacity, which no list knows.
-        InvalidArgumentError, MissingDependencyError
+        InvalidArgumentError, MissingDependencyError, NoDeviceError
             As for :func:`pyvista_vdi.generate`.
 
         Examples
