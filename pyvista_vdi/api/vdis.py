@@ -16,7 +16,6 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.levels import nearest_depth
 from pyvista_vdi.model.options import (
     Deferral,
     GenerationOptions,
@@ -34,6 +33,7 @@ from pyvista_vdi.model.types import (
     WindowSize,
 )
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.view import nearest_depth
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 
 

@@ -169,9 +169,8 @@ class DrawingOptions(Options):
         "auto",
         "what is raycast where the volume is at hand",
         '``"auto"``: on the screen by what gives the better picture within ``target_fps``, the VDI '
-        "near its view and the volume far from it; off-screen the volume, until so many pictures "
-        "of nearly the same view are taken that a VDI costs less. Volumes that overlap are drawn "
-        "by VDIs. ``actor.status.drawn`` says what was drawn.",
+        "near its view and the volume far from it; off-screen the volume. Volumes that overlap are "
+        "drawn by VDIs. ``actor.status.drawn`` says what was drawn.",
     )
     coverage: Coverage = option(
         "bounds",

@@ -1,11 +1,7 @@
 """The folder in which this package keeps what it would otherwise make anew in each process."""
 
-import atexit
-import contextlib
 import logging
 import os
-import shutil
-import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -16,23 +12,19 @@ _logger = logging.getLogger(__name__)
 
 @cache
 def user_cache() -> Path | None:
-    """Return the user's cache folder; where it cannot be written a temporary one, if it can be.
+    """Return the user's cache folder of this package; None where it cannot be written.
 
-    Services and containers often run without a home. That goes to the log, once.
+    Services and containers often run without a home. The log says so, once.
     """
     try:
         return writable_cache("pyvista-vdi")
     except OSError as error:
         _logger.warning(
-            "the user's cache folder cannot be written (%s): kernels are compiled anew in each "
-            "process; set XDG_CACHE_HOME to a folder that can be",
+            "the user's cache folder cannot be written (%s): kernels are compiled in each process; "
+            "set XDG_CACHE_HOME to a folder that can be",
             error,
         )
-    with contextlib.suppress(OSError):
-        folder = Path(tempfile.mkdtemp(prefix="pyvista-vdi-"))
-        atexit.register(shutil.rmtree, folder, ignore_errors=True)
-        return folder
-    return None
+        return None
 
 
 def writable_cache(name: str, author: str | None = None) -> Path:

@@ -214,6 +214,12 @@ class VDI(Lists):
         return self.late if isinstance(self.late, Packed8) else None
 
     @property
+    def n_supersegments(self) -> int:
+        """Number of supersegments in all lists."""
+        known = getattr(self.late, "n_supersegments", None)
+        return super().n_supersegments if known is None else known
+
+    @property
     def color(self) -> NDArray[np.float32]:
         """Straight RGB, 0 to 1, float32 (n, 3)."""
         return self.arrays.color

@@ -47,7 +47,6 @@ def require_image(data: Any) -> vtk.vtkImageData:
     """Return ``data`` if it is a uniform grid, and say how to make one of anything else."""
     if isinstance(data, vtk.vtkImageData):
         return data
-    vtk.require_this_build(type(data))
     if not hasattr(data, "GetClassName"):
         raise InvalidVolumeTypeError(
             f"expected a vtkImageData or pyvista.ImageData; got {type(data).__name__}"
@@ -282,7 +281,6 @@ def vdi_from_image(image: Any) -> VDI | DeferredVDI:
     InvalidVDIError
         If the image is not such a form, of a newer version, or its arrays break a rule.
     """
-    vtk.require_this_build(type(image))
     if not is_vdi_image(image):
         kind = type(image).__name__
         raise InvalidVDIError(
