@@ -385,9 +385,7 @@ class KeptValues(PreparedVDI):
         """Return what a transfer function shows: what is transparent is left out."""
         runtime, shown, bundles = self.runtime, copy.copy(self), self.headers.shape[0]
         if runtime.is_cpu:
-            shown.lit = share_lit(
-                self._lists, *self.depths, lambda rows: look.media_of(look, rows)[1]
-            )
+            shown.lit = share_lit(self._lists, *self.depths, partial(look.media_of, look))
         with (
             kept_together() as keep,
             runtime.upload(look.integrals, "integrals of a transfer function") as table,
