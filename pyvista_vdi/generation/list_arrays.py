@@ -182,7 +182,12 @@ class GrowingLists:
         self._wait()
         self._wait = None
         begin, self._known = self._known, int(self._sum[0])
-        require_room(self._known, self._size)
+        width, height = self._size
+        require_host_memory(
+            self._known * SUPERSEGMENT_BYTES + self._offsets.nbytes,
+            f"a VDI of {width} x {height} lists",
+            "lower the window size or max_supersegments, or raise tolerance",
+        )
         if self._known > self._end:
             self._make_room(begin, self._known)
 
@@ -239,12 +244,3 @@ class GrowingLists:
 def blocks_to_sum(lists: int) -> int:
     """Return the work-groups that sum up the lengths of so many lists."""
     return -(-lists // (GROUP * LISTS_PER_ITEM))
-
-
-def require_room(supersegments: int, size: tuple[int, int]) -> None:
-    """Refuse to go on where the host cannot hold a VDI of at least so many supersegments."""
-    require_host_memory(
-        supersegments * SUPERSEGMENT_BYTES + 8 * size[0] * size[1],
-        f"a VDI of {size[0]} x {size[1]} lists",
-        "lower the window size or max_supersegments, or raise tolerance",
-    )

@@ -13,7 +13,7 @@ from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import Arrays
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI, with_arrays
+from pyvista_vdi.model.vdi import VDI, made_vdi
 
 #: Straight colours and optical depths of supersegments.
 Media = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -98,4 +98,4 @@ def classify(
         "transfer_function": transfer_function.to_dict(),
         "deferred": deferred.about,
     }
-    return with_arrays(deferred, ValuesLook(deferred, integrals, media_of), metadata=metadata)
+    return made_vdi(ValuesLook(deferred, integrals, media_of), deferred, metadata=metadata)
