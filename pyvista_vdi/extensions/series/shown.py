@@ -222,7 +222,7 @@ class SeriesInput(SeveralInput):
         Time does not wait: steps that are not ready when theirs comes are left out. Without an
         event loop, as off-screen, a frame shows the step of the moment; for a movie set
         :attr:`time`. ``loop``: whether the first step follows the last. ``memory_limit``: bytes
-        that decoded steps may take, or as ``"2 GiB"``; 1 GiB by default.
+        that decoded steps may take; 1 GiB by default.
         """
         if isinstance(rate, bool) or not 0 < as_float(rate) < math.inf:
             raise InvalidArgumentError(f"rate must be steps per second, above 0; got {rate!r}")

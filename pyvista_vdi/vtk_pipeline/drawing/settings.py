@@ -48,6 +48,13 @@ SETTINGS: Mapping[str, Option] = {
     "OpacityMultiplier": _DECLARED["opacity_multiplier"],
     "TransmittanceCutoff": _DECLARED["transmittance_cutoff"],
     "TargetFrameRate": _DECLARED["target_fps"],
+    "AutoAdjustMultiSamples": Option(
+        "adjust_multi_samples",
+        True,
+        "whether previews go without multisampling where that makes them late",
+        "All VDIs in a window must allow it; ``GetMultiSamples()`` stays as it was set.",
+        check=partial(as_flag, name="AutoAdjustMultiSamples"),
+    ),
     "ImageSampleDistance": Option(
         "image_distance",
         1.0,
@@ -68,13 +75,6 @@ SETTINGS: Mapping[str, Option] = {
         "That is where the window's desired update rate is at least 1 per second. Frames at rest, "
         "screenshots, exports and off-screen windows are always full.",
         check=partial(as_flag, name="AutoAdjustSampleDistances"),
-    ),
-    "AutoAdjustMultiSamples": Option(
-        "adjust_multi_samples",
-        True,
-        "whether previews go without multisampling where that makes them late",
-        "All VDIs in a window must allow it.",
-        check=partial(as_flag, name="AutoAdjustMultiSamples"),
     ),
     "InteractiveOffScreen": Option(
         "off_screen",
