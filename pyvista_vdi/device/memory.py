@@ -43,7 +43,7 @@ class DeviceBuffer:
     Released by :meth:`release`, at the end of a ``with`` block, or with its last reference.
     ``nbytes`` is its size as asked for, ``name`` what it holds, for messages, and ``memory`` the
     driver's object, None when it has been given back. Where kernels write a host array's memory,
-    that is ``host`` (:meth:`Runtime.result`, :meth:`Runtime.target`).
+    that is ``host`` (:meth:`Runtime.result`).
     """
 
     memory: Any = None
@@ -67,11 +67,6 @@ class DeviceBuffer:
         """Return the memory; a second call does nothing. Enqueued work still finishes."""
         self.memory = None
         self._finalizer()
-
-    @property
-    def released(self) -> bool:
-        """Whether the memory has been given back."""
-        return self.memory is None
 
     def used(self) -> Any:
         """Return the driver's memory for a use of it; DeviceError if it has been given back."""
@@ -127,9 +122,6 @@ class Memory(Turns):
         tools = self.cl.tools
         self._pool = tools.MemoryPool(tools.ImmediateAllocator(self.queue))
         self._sent: list[Any] = []  # events of copies that nobody has waited for, and their arrays
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} on {self.info.full_name}>"
 
     def failure(self, error: Any, doing: str) -> DeviceError | DeviceMemoryError:
         """Return the package's error for one of the driver's, naming what was being done."""
@@ -196,30 +188,24 @@ class Memory(Turns):
         return self._take(self.cl.mem_flags.READ_WRITE, shape, np.dtype(dtype), name)
 
     def result(
-        self, shape: tuple[int, ...], dtype: DTypeLike = np.float32, name: str = "result"
+        self,
+        shape: tuple[int, ...],
+        dtype: DTypeLike = np.float32,
+        name: str = "result",
+        *,
+        out: NDArray[Any] | None = None,
     ) -> DeviceBuffer:
         """Return uninitialised memory for kernels to write, downloaded when they have.
 
         On a CPU device it is the memory of the array that :meth:`download` returns, so that nothing
-        is copied, and that array holds what is written afterwards, too. All else, and what is
-        raised, as for :meth:`buffer`.
+        is copied, and that array holds what is written afterwards, too. ``out``: that array, or
+        another that begins with it, C-contiguous and writable; a CPU device writes into it if it is
+        aligned, and leave it alone until the download. All else as for :meth:`buffer`.
         """
         access, own = self.cl.mem_flags.READ_WRITE, np.dtype(dtype)
-        if self.is_cpu and 0 not in shape:
+        if self.is_cpu and 0 not in shape and (out is None or self.in_place(out)):
             access |= self.cl.mem_flags.USE_HOST_PTR
-        return self._take(access, shape, own, name, pooled=not self.is_cpu)
-
-    def target(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
-        """Return memory for kernels to write what an array is to hold, see :meth:`download`.
-
-        A CPU device writes into an array that is aligned for it in place, and the download into
-        that very array, or its beginning, copies nothing. The array is C-contiguous and writable;
-        what is in it is not read. Leave it alone until the download.
-        """
-        access, host = self.cl.mem_flags.READ_WRITE, None
-        if self.in_place(array):
-            access, host = access | self.cl.mem_flags.USE_HOST_PTR, array
-        return self._take(access, array.shape, array.dtype, name, host)
+        return self._take(access, shape, own, name, out, pooled=not self.is_cpu)
 
     def upload(
         self, array: NDArray[Any], name: str = "array", *, brief: bool = False
@@ -261,7 +247,7 @@ class Memory(Turns):
         held, nbytes = buffer.held, buffer.nbytes
         in_place = bool(flags & cl.mem_flags.USE_HOST_PTR)
         # A caller's array takes no memory; drivers refuse size 0
-        taken = 0 if host is not None else max(nbytes, dtype.itemsize)
+        taken = 0 if in_place and host is not None else max(nbytes, dtype.itemsize)
         try:
             # Refuse what the device has no room for
             with self._ledger:
@@ -289,16 +275,11 @@ class Memory(Turns):
                     held.memory = cl.Buffer(self._context, flags, hostbuf=host)
                 else:
                     held.memory = cl.Buffer(self._context, flags, size=taken)
-        except BaseException as error:
+        except BaseException:
             buffer.release()  # now: whoever keeps the error keeps this frame
-            if isinstance(error, MemoryError) and not isinstance(error, DeviceMemoryError):
-                raise DeviceMemoryError(
-                    f"there is no host memory for the buffer {name!r} of {bytes_text(nbytes)}: "
-                    f"close other programs, or {_SMALLER}"
-                ) from error
             raise
         held.in_place, buffer.memory = in_place, held.memory
-        buffer.host = host if flags & cl.mem_flags.READ_WRITE else None
+        buffer.host = host if in_place and flags & cl.mem_flags.READ_WRITE else None
         return buffer
 
     def _release(self, held: Held) -> None:

@@ -138,7 +138,8 @@ class GrowingLists:
         bring_to_host(runtime, SUPERSEGMENT_BYTES * self._room)
         with kept_together() as keep:
             sums = keep(runtime.buffer((blocks_to_sum(slice_lists),), np.uint64, "sums of lengths"))
-            offsets = keep(runtime.target(self._offsets, "list offsets"))
+            place = self._offsets
+            offsets = keep(runtime.result(place.shape, np.uint64, "list offsets", out=place))
             runtime.fill(offsets, 0, 1)
             shared = {"partial": GROUP, "sums": sums}
             self._sum_lengths = runtime.bind("generation/offsets.cl", "sum_lengths", **shared)
@@ -218,7 +219,8 @@ class GrowingLists:
         self._begin, self._end = begin, max(end, min(room, begin + self._largest))
         for name, array in self._arrays.items():
             part: NDArray[Any] = array.part(begin, self._end)
-            self._targets[name] = self._runtime.target(part, _ARRAYS[name][0])
+            target = self._runtime.result(part.shape, name=_ARRAYS[name][0], out=part)
+            self._targets[name] = target
 
     def _collect(self, made: int) -> None:
         """Wait until so many supersegments are in the host's arrays; in place, release buffers."""

@@ -65,7 +65,7 @@ def test_a_target_gets_what_kernels_write(runtime, aligned):
     array = array.reshape(40, 50)
     array[...] = -1
     before = runtime.allocated
-    with runtime.target(array, "values") as buffer:
+    with runtime.result(array.shape, name="values", out=array) as buffer:
         in_place = runtime.is_cpu and aligned
         assert (buffer.host is array) == in_place
         assert runtime.allocated - before == (0 if in_place else array.nbytes)

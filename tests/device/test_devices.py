@@ -8,7 +8,7 @@ import pytest
 from fresh_python import run_python
 
 from pyvista_vdi import device as ocl
-from pyvista_vdi.device import choice, devices, icd
+from pyvista_vdi.device import choice, devices
 from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError
 
 
@@ -115,7 +115,5 @@ def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
     described, message = done.stdout.split("caught ")
     for text in (described, message):
         assert "no usable OpenCL device" in text
-        installed = icd.intel_library() is not None
-        assert ('pip install "pyvista-vdi[cpu]"' in text) != installed
-        assert ("pocl-opencl-icd" in text) != installed
-        assert ("unset OCL_ICD_VENDORS" in text) == installed
+        assert 'pip install "pyvista-vdi[cpu]"' in text
+        assert "unset OCL_ICD_VENDORS" in text

@@ -186,7 +186,7 @@ DeviceBuffer.__init__ = _noted
 def state_of(runtime):
     """What must be as before when something went wrong: buffers, memory."""
     gc.collect()
-    living = sorted((buffer.name, buffer.nbytes) for buffer in _BUFFERS if not buffer.released)
+    living = sorted((buffer.name, buffer.nbytes) for buffer in _BUFFERS if buffer.memory)
     return living, runtime.allocated
 
 
