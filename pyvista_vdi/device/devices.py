@@ -7,7 +7,6 @@ driver.
 import contextlib
 import ctypes
 import importlib.metadata
-import importlib.util
 import os
 import sys
 import tempfile
@@ -137,12 +136,6 @@ def listing(infos: Sequence[DeviceInfo]) -> str:
     return "; ".join(found) or "no device at all"
 
 
-def no_device_message(infos: Sequence[DeviceInfo]) -> str:
-    """Return what was found where nothing can be used, why it failed, and what to do."""
-    found = f"found {listing(infos)}" if infos else "no OpenCL driver lists a device"
-    return f"no usable OpenCL device: {found}. Remedy: {REMEDY}"
-
-
 def bytes_text(nbytes: int) -> str:
     """Return a number of bytes for people: ``"1.50 GiB (1610612736 bytes)"``."""
     for unit, size in (("GiB", 2**30), ("MiB", 2**20), ("KiB", 2**10)):
@@ -202,9 +195,8 @@ def _import_pyopencl() -> ModuleType:
             f"pyopencl cannot be imported ({exc}); install it with  pip install --upgrade pyopencl"
             "  (its wheels bring an OpenCL loader; a build from source needs libOpenCL)"
         ) from exc
-    # There pyopencl keeps the Python code that it makes for kernels, and it fails where it cannot
     try:
-        writable_cache("pytools", "pytools")
+        writable_cache("pytools", "pytools")  # for the Python code that it makes for kernels
     except OSError:
         cl._PYOPENCL_NO_CACHE = True
     return cl
@@ -275,18 +267,13 @@ def libraries_with(added: Path) -> list[str]:
 
     A bare library name is left to the dynamic linker; a path that does not exist is dropped.
     """
-    folders = [Path("/etc/OpenCL/vendors"), Path(sys.prefix) / "etc" / "OpenCL" / "vendors"]
-    # The loader of pyopencl's wheels reads its own folder; pocl-binary-distribution installs there.
-    spec = importlib.util.find_spec("pyopencl")
-    folders += [Path(spec.origin).parent / ".libs"] if spec and spec.origin else []
     found: list[str] = []
-    for file in (file for folder in folders for file in sorted(folder.glob("*.icd"))):
-        with contextlib.suppress(OSError):  # unreadable for us, hence for the loader as well
-            library = file.read_text(encoding="utf-8", errors="surrogateescape").strip()
-            if library and (file.parent / library).is_file():
-                library = str(file.parent / library)
-            if library and (os.sep not in library or Path(library).is_file()):
-                found.append(library)
+    for folder in ("/etc/OpenCL/vendors", Path(sys.prefix, "etc", "OpenCL", "vendors")):
+        for file in sorted(Path(folder).glob("*.icd")):
+            with contextlib.suppress(OSError):  # unreadable for us, hence for the loader as well
+                library = file.read_text(encoding="utf-8", errors="surrogateescape").strip()
+                if library and (os.sep not in library or Path(library).is_file()):
+                    found.append(library)
     if not any(Path(library).name.startswith(INTEL_LIBRARY) for library in found):
         found.append(str(added))
     return list(dict.fromkeys(found))

@@ -73,9 +73,6 @@ class Launch:
                     f"argument {name!r} of kernel {kernel.name!r} is declared as {parameter.kind}; "
                     f"{value!r} of type {type(value).__name__} was given"
                 ) from exc
-            except device.cl.Error as exc:
-                doing = f"setting argument {name!r} of {kernel.name!r} of {kernel.path}"
-                raise device.failure(exc, doing) from exc
             self._buffers.pop(name, None)
             if is_buffer:
                 self._buffers[name] = value

@@ -14,7 +14,7 @@ from pyvista_vdi.device import devices
 from pyvista_vdi.device.devices import DeviceInfo, bytes_text
 from pyvista_vdi.device.scheduling import Turns
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError
-from pyvista_vdi.model.host_memory import HOST_ALIGNMENT, aligned_empty
+from pyvista_vdi.model.host_memory import aligned_empty
 
 #: Page-locked host memory that a device may have, and the least worth it, bytes.
 PINNED_BYTES, LEAST_PINNED = 256 * 2**20, 2**20
@@ -115,7 +115,7 @@ class Memory(Turns):
         # Re-entrant: a garbage collection inside the lock may release other buffers
         self._ledger = threading.RLock()
         self._alignment = max(1, int(self._device.mem_base_addr_align) // 8)
-        self._pinned: list[tuple[Any, Any]] = []  # that nobody has any more
+        self._pinned: dict[int, list[tuple[Any, Any]]] = {}  # by size, that nobody has any more
         self._pinned_bytes = 0
         # Of pictures and of what launches read once: to allocate memory anew for each frame takes a
         # GPU longer than to draw it, and to release it waits for the frame
@@ -166,11 +166,8 @@ class Memory(Turns):
 
     @property
     def in_place_alignment(self) -> int | None:
-        """Bytes; what begins at a multiple in an :func:`aligned_empty` array is used in place.
-
-        None where a device uses no array in place.
-        """
-        return self._alignment if self.is_cpu and HOST_ALIGNMENT % self._alignment == 0 else None
+        """Bytes at a multiple of which an array begins that is used in place; None: none is."""
+        return self._alignment if self.is_cpu else None
 
     def in_place(self, array: NDArray[Any]) -> bool:
         """Return whether kernels can use a C-contiguous array where it is."""
@@ -301,32 +298,24 @@ class Memory(Turns):
         That is scarce: what :data:`PINNED_BYTES` has no room for is in ordinary memory.
         """
         cl, nbytes = self.cl, math.prod(shape) * dtype.itemsize
+        size = 1 << (nbytes - 1).bit_length()  # so that windows of other sizes use it, too
         with self._ledger:
-            sizes = [mapped.nbytes for _, mapped in self._pinned]
-            if nbytes not in sizes and self._pinned_bytes + nbytes > PINNED_BYTES:
-                while self._pinned:
-                    block, mapped = self._pinned.pop()
-                    mapped.base.release(self.queue)
-                    block.release()
-                    self._pinned_bytes -= mapped.nbytes
-            if nbytes in sizes:
-                block, mapped = self._pinned.pop(sizes.index(nbytes))
-            elif self._pinned_bytes + nbytes > PINNED_BYTES:
+            free = self._pinned.setdefault(size, [])
+            if not free and self._pinned_bytes + size > PINNED_BYTES:
                 return np.empty(shape, dtype)
-            else:
-                access = cl.map_flags.READ | cl.map_flags.WRITE
-                flags = cl.mem_flags.READ_WRITE | cl.mem_flags.ALLOC_HOST_PTR
-                try:
-                    block = cl.Buffer(self._context, flags, nbytes)
-                    mapped, _ = cl.enqueue_map_buffer(
-                        self.queue, block, access, 0, (nbytes,), np.uint8
-                    )
-                except cl.Error:
-                    return np.empty(shape, dtype)
-                self._pinned_bytes += nbytes
+            try:
+                if not free:
+                    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.ALLOC_HOST_PTR
+                    block, access = cl.Buffer(self._context, flags, size), cl.map_flags.WRITE
+                    place = self.queue, block, access, 0, (size,), np.uint8
+                    free.append((block, cl.enqueue_map_buffer(*place)[0]))
+                    self._pinned_bytes += size
+            except cl.Error:
+                return np.empty(shape, dtype)
+            block, mapped = free.pop()
         # Views have this array as their base, so that it lives as long as they do
-        array = np.frombuffer(memoryview(mapped), dtype)
-        weakref.finalize(array, self._pinned.append, (block, mapped)).atexit = False
+        array = np.frombuffer(memoryview(mapped)[:nbytes], dtype)
+        weakref.finalize(array, free.append, (block, mapped)).atexit = False
         return array.reshape(shape)
 
     def download(self, buffer: DeviceBuffer, out: NDArray[Any] | None = None) -> NDArray[Any]:

@@ -27,8 +27,6 @@ SHORTEST_TURN = 0.001
 LONGEST_PIECE = 0.025
 #: Frames that "a recent frame" is the median of; before the first, one took so many seconds.
 RECENT_FRAMES, FIRST_FRAME = 5, 1 / 60
-#: A turn ends when less than this share of it is left: no useful piece fits.
-LEAST_REMAINDER = 0.15
 #: Pieces of one kind of work whose slowest says how fast the next will be: more than a slice of
 #: rays has, so that a march through nothing does not make the next one through much too long.
 RECENT_PIECES = 32
@@ -158,7 +156,7 @@ class Turns:
             raise Cancelled("background work was cancelled")
         turn = max(SHORTEST_TURN, SHARE * statistics.median(list(self._recent)))
         left = worker.turn_began + turn - time.perf_counter()
-        over = left <= LEAST_REMAINDER * turn
+        over = left <= 0.15 * turn  # no useful piece fits
         with self._changed:  # throughout, so that who is let in finds this thread waiting already
             if (over and (self._arriving or self._waiting)) or worker.paused():
                 self._end_turn(worker)

@@ -9,15 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import (
-    DeviceBuffer,
-    GrowingArray,
-    Runtime,
-    aligned_empty,
-    kept_together,
-)
+from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together
 from pyvista_vdi.device.constants import GROUP, LISTS_PER_ITEM
-from pyvista_vdi.model.host_memory import require_host_memory
+from pyvista_vdi.model.host_memory import GrowingArray, aligned_empty, require_host_memory
 from pyvista_vdi.model.packing import Arrays
 
 #: A VDI's arrays of supersegments, as kernels and as messages call them, and an element's shape.
