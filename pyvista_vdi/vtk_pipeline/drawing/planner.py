@@ -284,7 +284,7 @@ class Planner:
         each, settings = self.costs.volume, self.settings
         if each is None or settings.target == 0:
             return False
-        return window.pace.late(each * self._pixels, window.rate(settings))
+        return window.pace.late(each * self._pixels + self.costs.fixed, window.rate(settings))
 
     # What is planned is done
 
