@@ -13,13 +13,13 @@ from numpy.typing import DTypeLike, NDArray
 from pyvista_vdi.device import devices
 from pyvista_vdi.device.devices import DeviceInfo, bytes_text
 from pyvista_vdi.device.scheduling import Turns
-from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.errors import DeviceError, DeviceMemoryError
 from pyvista_vdi.model.host_memory import HOST_ALIGNMENT, aligned_empty
 
 #: Page-locked host memory that a device may have, and the least worth it, bytes.
 PINNED_BYTES, LEAST_PINNED = 256 * 2**20, 2**20
-#: Bytes of the largest results whose memory on a GPU is kept for the next ones, and how many.
-MOST_POOLED, BLOCKS_HELD = 64 * 2**20, 4
+#: Bytes of the largest buffers whose memory is kept for the next ones, and of all that is kept.
+MOST_POOLED, MOST_KEPT = 64 * 2**20, 256 * 2**20
 #: Bytes that background work copies at a time: about a millisecond at a host memory's pace.
 COPY_BYTES = 4 * 2**20
 
@@ -42,8 +42,7 @@ class DeviceBuffer:
 
     Released by :meth:`release`, at the end of a ``with`` block, or with its last reference.
     ``nbytes`` is its size as asked for, ``name`` what it holds, for messages, and ``memory`` the
-    driver's object, None when it has been given back. :meth:`Runtime.write` and
-    :meth:`Runtime.fill` change it if it is ``writable``. Where kernels write a host array's memory,
+    driver's object, None when it has been given back. Where kernels write a host array's memory,
     that is ``host`` (:meth:`Runtime.result`, :meth:`Runtime.target`).
     """
 
@@ -56,10 +55,8 @@ class DeviceBuffer:
         dtype: np.dtype[Any],
         name: str,
         give_back: Callable[[Held], None],
-        *,
-        writable: bool = True,
     ) -> None:
-        self.shape, self.dtype, self.name, self.writable = shape, dtype, name, writable
+        self.shape, self.dtype, self.name = shape, dtype, name
         self.nbytes = math.prod(shape) * dtype.itemsize
         # Nothing is held yet, so that wherever an interrupt comes, what is held goes back
         self.held = Held()
@@ -125,9 +122,11 @@ class Memory(Turns):
         self._alignment = max(1, int(self._device.mem_base_addr_align) // 8)
         self._pinned: list[tuple[Any, Any]] = []  # that nobody has any more
         self._pinned_bytes = 0
-        # Of pictures: to allocate one anew for each frame takes a GPU longer than to draw it
+        # Of pictures and of what launches read once: to allocate memory anew for each frame takes a
+        # GPU longer than to draw it, and to release it waits for the frame
         tools = self.cl.tools
         self._pool = tools.MemoryPool(tools.ImmediateAllocator(self.queue))
+        self._sent: list[Any] = []  # events of copies that nobody has waited for, and their arrays
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} on {self.info.full_name}>"
@@ -171,6 +170,7 @@ class Memory(Turns):
         """Wait until all is done that was enqueued; DeviceError if a kernel failed."""
         with self.failing("waiting for enqueued work"):
             self.queue.finish()
+        self._sent.clear()
 
     @property
     def in_place_alignment(self) -> int | None:
@@ -196,59 +196,52 @@ class Memory(Turns):
         return self._take(self.cl.mem_flags.READ_WRITE, shape, np.dtype(dtype), name)
 
     def result(
-        self,
-        shape: tuple[int, ...],
-        dtype: DTypeLike = np.float32,
-        name: str = "result",
-        *,
-        lasting: bool = False,
+        self, shape: tuple[int, ...], dtype: DTypeLike = np.float32, name: str = "result"
     ) -> DeviceBuffer:
         """Return uninitialised memory for kernels to write, downloaded when they have.
 
         On a CPU device it is the memory of the array that :meth:`download` returns, so that nothing
-        is copied, and that array holds what is written afterwards, too. ``lasting``: it is kept for
-        long, and not of the pool; all else, and what is raised, as for :meth:`buffer`.
+        is copied, and that array holds what is written afterwards, too. All else, and what is
+        raised, as for :meth:`buffer`.
         """
-        flags, own = self.cl.mem_flags, np.dtype(dtype)
+        access, own = self.cl.mem_flags.READ_WRITE, np.dtype(dtype)
         if self.is_cpu and 0 not in shape:
-            access = flags.READ_WRITE | flags.USE_HOST_PTR
-            return self._take(access, shape, own, name)
-        pooled = not (self.is_cpu or lasting or 0 in shape)
-        return self._take(flags.READ_WRITE, shape, own, name, pooled=pooled)
+            access |= self.cl.mem_flags.USE_HOST_PTR
+        return self._take(access, shape, own, name, pooled=not self.is_cpu)
 
     def target(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
         """Return memory for kernels to write what an array is to hold, see :meth:`download`.
 
         A CPU device writes into an array that is aligned for it in place, and the download into
-        that very array, or its beginning, copies nothing. The array is C-contiguous and writable
-        (InvalidArgumentError else); what is in it is not read. Leave it alone until the download.
+        that very array, or its beginning, copies nothing. The array is C-contiguous and writable;
+        what is in it is not read. Leave it alone until the download.
         """
-        if not (array.flags.c_contiguous and array.flags.writeable):
-            raise InvalidArgumentError(
-                f"the array for {name!r} must be C-contiguous and writable; its strides are "
-                f"{array.strides}, writeable={array.flags.writeable}"
-            )
         access, host = self.cl.mem_flags.READ_WRITE, None
         if self.in_place(array):
             access, host = access | self.cl.mem_flags.USE_HOST_PTR, array
         return self._take(access, array.shape, array.dtype, name, host)
 
-    def upload(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
+    def upload(
+        self, array: NDArray[Any], name: str = "array", *, brief: bool = False
+    ) -> DeviceBuffer:
         """Return an array's values on the device, for kernels to read; ``name`` says of what.
 
         A CPU device uses an array that is C-contiguous and aligned for it in place (see
         :func:`aligned_empty`): do not change the array before the buffer is released. Otherwise
-        the values are copied. The buffer is not writable. Raises as :meth:`buffer` does.
+        the values are copied. ``brief``: for launches that are enqueued now, and released behind
+        them. Nothing waits then; do not change the array before their results are downloaded.
+        Raises as :meth:`buffer` does.
         """
-        shape, array, flags = np.shape(array), np.ascontiguousarray(array), self.cl.mem_flags
-        in_place, dtype = self.in_place(array), array.dtype
-        if in_place or self.thread.worker is None or array.nbytes <= COPY_BYTES:
-            access = flags.READ_ONLY | (flags.USE_HOST_PTR if in_place else flags.COPY_HOST_PTR)
-            return self._take(access, shape, dtype, name, array, writable=False)
-        # In pieces: a driver that makes a buffer from an array keeps Python's lock
+        array, flags = np.ascontiguousarray(array), self.cl.mem_flags
+        if self.in_place(array):
+            access = flags.READ_ONLY | flags.USE_HOST_PTR
+            return self._take(access, array.shape, array.dtype, name, array)
         with kept_together() as keep:
-            buffer = keep(self._take(flags.READ_ONLY, shape, dtype, name, writable=False))
-            self._copy(buffer, array)
+            access = flags.READ_ONLY
+            buffer = keep(self._take(access, array.shape, array.dtype, name, pooled=brief))
+            event = self._copy(buffer, array, later=brief)
+        if event is not None:
+            self._sent.append(event)
         return buffer
 
     def _take(
@@ -259,20 +252,16 @@ class Memory(Turns):
         name: str,
         host: NDArray[Any] | None = None,
         *,
-        writable: bool = True,
         pooled: bool = False,
     ) -> DeviceBuffer:
-        """Return a buffer, filled from a host array or used in its place as the flags say.
-
-        Where they want a host array's place and there is none, one is made.
-        """
+        """Return a buffer in a host array's place if the flags say so; one is made if need be."""
         devices.require_drivers()
         cl, limits = self.cl, self.info
-        buffer = DeviceBuffer(shape, dtype, name, self._release, writable=writable)
+        buffer = DeviceBuffer(shape, dtype, name, self._release)
         held, nbytes = buffer.held, buffer.nbytes
         in_place = bool(flags & cl.mem_flags.USE_HOST_PTR)
         # A caller's array takes no memory; drivers refuse size 0
-        taken = 0 if in_place and host is not None else max(nbytes, dtype.itemsize)
+        taken = 0 if host is not None else max(nbytes, dtype.itemsize)
         try:
             # Refuse what the device has no room for
             with self._ledger:
@@ -292,15 +281,14 @@ class Memory(Turns):
             if in_place and host is None:
                 host = aligned_empty(shape, dtype)
             with self.failing(f"allocating {bytes_text(nbytes)} for the buffer {name!r}"):
-                if pooled and nbytes <= MOST_POOLED:
-                    if self._pool.held_blocks > BLOCKS_HELD:  # of windows that were larger once
+                if pooled and 0 < nbytes <= MOST_POOLED:
+                    if self._pool.managed_bytes - self._pool.active_bytes > MOST_KEPT:
                         self._pool.free_held()
                     held.memory = self._pool.allocate(nbytes)
-                elif host is None or nbytes == 0:
-                    flags &= ~cl.mem_flags.COPY_HOST_PTR
-                    held.memory = cl.Buffer(self._context, flags, size=taken)
-                else:
+                elif in_place:
                     held.memory = cl.Buffer(self._context, flags, hostbuf=host)
+                else:
+                    held.memory = cl.Buffer(self._context, flags, size=taken)
         except BaseException as error:
             buffer.release()  # now: whoever keeps the error keeps this frame
             if isinstance(error, MemoryError) and not isinstance(error, DeviceMemoryError):
@@ -310,7 +298,7 @@ class Memory(Turns):
                 ) from error
             raise
         held.in_place, buffer.memory = in_place, held.memory
-        buffer.host = host if in_place and writable else None
+        buffer.host = host if flags & cl.mem_flags.READ_WRITE else None
         return buffer
 
     def _release(self, held: Held) -> None:
@@ -333,12 +321,13 @@ class Memory(Turns):
         """
         cl, nbytes = self.cl, math.prod(shape) * dtype.itemsize
         with self._ledger:
-            sizes = [memory.nbytes for _, memory in self._pinned]
-            while nbytes not in sizes and sizes and self._pinned_bytes + nbytes > PINNED_BYTES:
-                self._pinned_bytes -= sizes.pop(0)
-                block, mapped = self._pinned.pop(0)
-                mapped.base.release(self.queue)
-                block.release()
+            sizes = [mapped.nbytes for _, mapped in self._pinned]
+            if nbytes not in sizes and self._pinned_bytes + nbytes > PINNED_BYTES:
+                while self._pinned:
+                    block, mapped = self._pinned.pop()
+                    mapped.base.release(self.queue)
+                    block.release()
+                    self._pinned_bytes -= mapped.nbytes
             if nbytes in sizes:
                 block, mapped = self._pinned.pop(sizes.index(nbytes))
             elif self._pinned_bytes + nbytes > PINNED_BYTES:
@@ -348,8 +337,9 @@ class Memory(Turns):
                 flags = cl.mem_flags.READ_WRITE | cl.mem_flags.ALLOC_HOST_PTR
                 try:
                     block = cl.Buffer(self._context, flags, nbytes)
-                    place = self.queue, block, access, 0, (nbytes,), np.uint8
-                    mapped, _ = cl.enqueue_map_buffer(*place)
+                    mapped, _ = cl.enqueue_map_buffer(
+                        self.queue, block, access, 0, (nbytes,), np.uint8
+                    )
                 except cl.Error:
                     return np.empty(shape, dtype)
                 self._pinned_bytes += nbytes
@@ -362,8 +352,8 @@ class Memory(Turns):
         """Return the values of a buffer, when all that was enqueued before is done.
 
         They are in ``out``, a C-contiguous array of the buffer's dtype, as many from the start as
-        it has elements, or in a new one of the buffer's shape. InvalidArgumentError if these do not
-        fit; DeviceError if the driver fails, now or in a kernel before.
+        it has elements, or in a new one of the buffer's shape. DeviceError if the driver fails, now
+        or in a kernel before.
         """
         if out is None:
             out = buffer.host
@@ -375,7 +365,6 @@ class Memory(Turns):
             self._copy(buffer, out, to_host=True)
         elif out.nbytes:
             # Map it: the memory is the array's, so that nothing is copied, and the values stay
-            _check_exchange(buffer, out, 0, True)
             self.give_way()
             cl, queue = self.cl, self.queue
             with self.failing(f"reading the buffer {buffer.name!r}"):
@@ -390,9 +379,8 @@ class Memory(Turns):
         """Copy part of a buffer into an array when all that was enqueued before is done.
 
         Inside :meth:`background` the copy is done when this returns. As many elements as ``out``
-        has are copied, from the ``first`` on, or InvalidArgumentError is raised; leave it alone
-        until what is returned, when called, has waited for them (and raised DeviceError if the
-        driver failed).
+        has are copied, from the ``first`` on; leave it alone until what is returned, when called,
+        has waited for them (and raised DeviceError if the driver failed).
         """
         event = self._copy(buffer, out, to_host=True, first=first, later=True)
 
@@ -404,13 +392,8 @@ class Memory(Turns):
         return wait
 
     def write(self, buffer: DeviceBuffer, array: NDArray[Any], *, first: int = 0) -> None:
-        """Copy an array into a buffer, from the element ``first`` on.
-
-        The array is free to change when this returns. InvalidArgumentError if it does not fit, or
-        the buffer is not writable: one from :meth:`upload`.
-        """
-        _check_writable(buffer)
-        self._copy(buffer, np.ascontiguousarray(array), first=first)
+        """Copy a C-contiguous array into a buffer, from the element ``first`` on."""
+        self._copy(buffer, array, first=first)
 
     def _copy(
         self,
@@ -426,54 +409,34 @@ class Memory(Turns):
         With ``to_host`` the other way. Background work copies in pieces, and what others ask for
         ``later`` is not waited for: its event is returned.
         """
-        _check_exchange(buffer, host, first, to_host)
         memory, cl, queue = buffer.used(), self.cl, self.queue
         background = self.thread.worker is not None
         waits, event = background or not later, None
-        data, offset = host.reshape(-1).view(np.uint8), first * host.itemsize
-        size = COPY_BYTES if background else max(1, data.nbytes)
+        data: Any = host.data.cast("B") if host.nbytes else b""
+        size = COPY_BYTES if background else max(1, host.nbytes)
         with self.failing(f"{'reading' if to_host else 'writing'} the buffer {buffer.name!r}"):
-            for start in range(0, data.nbytes, size):
+            for start in range(0, host.nbytes, size):
                 self.give_way()
-                part, place = data[start : start + size], offset + start
+                part, place = data[start : start + size], first * host.itemsize + start
                 if to_host:
                     ends = {"dest": part, "src": memory, "src_offset": place}
                 else:
                     ends = {"dest": memory, "src": part, "dst_offset": place}
                 event = cl.enqueue_copy(queue, **ends, is_blocking=waits)
-        return None if waits else event
+        if not waits:
+            return event
+        self._sent.clear()
+        return None
 
-    def fill(self, buffer: DeviceBuffer, value: int | np.generic) -> None:
-        """Fill a buffer, not one from :meth:`upload`, with one byte or one element.
-
-        A Python integer (0 to 255) is a byte; a NumPy scalar is the pattern as it is.
-        """
-        _check_writable(buffer)
-        pattern = np.uint8(value) if isinstance(value, int) else value
-        memory, queue = buffer.used(), self.queue
-        if buffer.nbytes == 0:
+    def fill(
+        self, buffer: DeviceBuffer, value: float | np.generic, count: int | None = None
+    ) -> None:
+        """Fill a buffer, or its first elements, with a number."""
+        memory, queue, pattern = buffer.used(), self.queue, np.array(value, buffer.dtype)
+        nbytes = buffer.nbytes if count is None else count * buffer.dtype.itemsize
+        if nbytes == 0:
             return
         with self.failing(f"filling the buffer {buffer.name!r}"):
-            self.cl.enqueue_fill_buffer(queue, memory, pattern, 0, buffer.nbytes)
+            self.cl.enqueue_fill_buffer(queue, memory, pattern, 0, nbytes)
             if self.thread.worker is not None:
                 queue.finish()  # nothing of this thread runs when its turn is over
-
-
-def _check_writable(buffer: DeviceBuffer) -> None:
-    if not buffer.writable:
-        raise InvalidArgumentError(
-            f"the buffer {buffer.name!r} was uploaded and may share the caller's array; "
-            "make a buffer() to write to"
-        )
-
-
-def _check_exchange(buffer: DeviceBuffer, array: NDArray[Any], first: int, to_host: bool) -> None:
-    """Refuse an array that cannot exchange its elements with a buffer, from one on."""
-    room = buffer.nbytes // buffer.dtype.itemsize
-    wrong = array.dtype != buffer.dtype or not array.flags.c_contiguous
-    if wrong or not 0 <= first <= room - array.size or (to_host and not array.flags.writeable):
-        raise InvalidArgumentError(
-            f"the buffer {buffer.name!r} exchanges C-contiguous elements of {buffer.dtype}, "
-            f"{room} at most; the array has {array.size} of {array.dtype} from {first} on, strides "
-            f"{array.strides}, writeable={array.flags.writeable}"
-        )

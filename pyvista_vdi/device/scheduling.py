@@ -14,6 +14,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from pyvista_vdi.errors import Cancelled
 
@@ -212,7 +213,7 @@ class Turns:
             self._take_turn(worker)
 
     @contextlib.contextmanager
-    def holding(self, lock: threading.Lock) -> Iterator[None]:
+    def holding(self, lock: Any) -> Iterator[None]:
         """Hold a lock under which device work is done.
 
         Whoever holds it may be waiting for this thread's frame or turn to end, so a thread that

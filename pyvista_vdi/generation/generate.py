@@ -5,7 +5,7 @@ from typing import Any
 from pyvista_vdi._version import __version__
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import Cancelled
-from pyvista_vdi.generation.list_arrays import GrowingLists, bring_to_host, require_room
+from pyvista_vdi.generation.list_arrays import GrowingLists, require_room
 from pyvista_vdi.generation.march import March, Records
 from pyvista_vdi.generation.slices import Slices
 from pyvista_vdi.model.options import GenerationRequest
@@ -33,7 +33,6 @@ def generate_vdi(request: GenerationRequest) -> VDI:
     require_room(0, size)
     report(progress, 0.0)  # first: a bar says that kernels are compiled
     runtime = get_runtime(request.device)
-    bring_to_host(runtime)  # what was made before
     slices = Slices(runtime, size, options)
     medium = DeviceVolume(
         runtime, volume, request.transfer_function, options, room=slices.room(volume)

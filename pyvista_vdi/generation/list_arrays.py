@@ -35,60 +35,69 @@ _SHARE = 16
 
 
 class ListsOnDevice:
-    """Lists in a device's own memory, where they were made, until somebody asks for arrays.
-
-    A device has those of one VDI: before it makes the next, they are brought to the host.
-    """
+    """Lists in ``buffers`` on a device, where they were made, until somebody asks for arrays."""
 
     def __init__(
-        self, runtime: Runtime, offsets: NDArray[np.uint64], buffers: dict[str, DeviceBuffer]
+        self,
+        runtime: Runtime,
+        offsets: NDArray[np.uint64],
+        n: int,
+        buffers: dict[str, DeviceBuffer],
     ) -> None:
-        offsets.setflags(write=False)
-        self.offsets, self._runtime, self._buffers = offsets, runtime, buffers
-        self.nbytes = offsets.nbytes + SUPERSEGMENT_BYTES * int(offsets[-1])
+        self._runtime, self.n_supersegments, self.buffers = runtime, n, buffers
+        self._offsets = offsets  # writable until they are here
+        self.nbytes = offsets.nbytes + SUPERSEGMENT_BYTES * n
         self._arrays: Arrays | None = None
-        self._lock = threading.Lock()
-        _latest[runtime] = weakref.ref(self)
+        self._lock = threading.RLock()
+        _on_devices.setdefault(runtime, []).append(weakref.ref(self))
+
+    @property
+    def offsets(self) -> NDArray[np.uint64]:
+        """Where each list begins; brought to the host when first asked for."""
+        with self._runtime.holding(self._lock):
+            if self._offsets.flags.writeable:
+                self._runtime.download(self.buffers["starts"], self._offsets)
+                self._offsets.setflags(write=False)
+            return self._offsets
 
     def arrays(self) -> Arrays:
         """Return the arrays; the device's memory is given back."""
-        runtime, n = self._runtime, int(self.offsets[-1])
-        with runtime.holding(self._lock):
+        with self._runtime.holding(self._lock):
             if self._arrays is None:
                 found = []
                 for name, (_, item) in _ARRAYS.items():
-                    array = np.empty((n, *item), np.float32)
-                    runtime.download(self._buffers[name], array)
-                    found.append(array)
+                    array = np.empty((self.n_supersegments, *item), np.float32)
+                    found.append(self._runtime.download(self.buffers[name], array))
                 self._arrays = Arrays(self.offsets, *found)
-                self._release()
+                for buffer in self.buffers.values():
+                    buffer.release()
+                self.buffers = {}
             return self._arrays
 
     @contextlib.contextmanager
     def on(self, runtime: Runtime) -> Iterator[dict[str, DeviceBuffer]]:
         """Hold the lists on a device for a ``with`` block; empty where they are not on it."""
         with runtime.holding(self._lock):
-            if self._buffers and runtime is self._runtime:
-                yield self._buffers
+            if self.buffers and runtime is self._runtime:
+                yield self.buffers
                 return
         yield {}
 
-    def _release(self) -> None:
-        for buffer in self._buffers.values():
-            buffer.release()
-        self._buffers = {}
 
-
-_latest: "weakref.WeakKeyDictionary[Runtime, weakref.ref[ListsOnDevice]]" = (
+_on_devices: "weakref.WeakKeyDictionary[Runtime, list[weakref.ref[ListsOnDevice]]]" = (
     weakref.WeakKeyDictionary()
 )
 
 
-def bring_to_host(runtime: Runtime) -> None:
-    """Bring the lists that are where a device made them to the host, if their VDI still lives."""
-    latest = _latest.pop(runtime, None)
-    if latest is not None and (lists := latest()) is not None:
-        lists.arrays()
+def bring_to_host(runtime: Runtime, nbytes: int) -> None:
+    """Bring the oldest lists to the host until a device's share has room for so many bytes."""
+    known = _on_devices.setdefault(runtime, [])
+    living = [lists for each in known if (lists := each()) is not None and lists.buffers]
+    held = [sum(buffer.nbytes for buffer in lists.buffers.values()) for lists in living]
+    while held and nbytes + sum(held) > runtime.info.global_memory // _SHARE:
+        living.pop(0).arrays()
+        held.pop(0)
+    known[:] = map(weakref.ref, living)
 
 
 class GrowingLists:
@@ -113,9 +122,8 @@ class GrowingLists:
         stay: bool = False,
     ) -> None:
         self._runtime, self._size, self._limit = runtime, size, limit
-        lists = size[0] * size[1]
-        self._most = lists * limit  # supersegments
-        self._offsets = aligned_empty(lists + 1, np.uint64)
+        self._most = size[0] * size[1] * limit  # supersegments
+        self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
         self._made = 0  # lists, those of the last slice included
         self._known = 0  # supersegments of all lists whose sum is known here
         self._begin = self._end = 0  # supersegments that the buffers hold
@@ -124,13 +132,14 @@ class GrowingLists:
         self._arrays = {name: GrowingArray(item) for name, (_, item) in _ARRAYS.items()}
         self._targets: dict[str, DeviceBuffer] = {}
         # Supersegments that a device's own buffers have room for
-        largest = runtime.info.max_allocation // _LARGEST_ELEMENT
+        self._largest = runtime.info.max_allocation // _LARGEST_ELEMENT
         share = runtime.info.global_memory // (_SHARE * SUPERSEGMENT_BYTES) if stay else 0
-        self._room = max(slice_lists * limit, min(share, largest, self._most))
+        self._room = max(slice_lists * limit, min(share, self._largest, self._most))
+        bring_to_host(runtime, SUPERSEGMENT_BYTES * self._room)
         with kept_together() as keep:
             sums = keep(runtime.buffer((blocks_to_sum(slice_lists),), np.uint64, "sums of lengths"))
             offsets = keep(runtime.target(self._offsets, "list offsets"))
-            runtime.write(offsets, np.zeros(1, np.uint64), first=0)
+            runtime.fill(offsets, 0, 1)
             shared = {"partial": GROUP, "sums": sums}
             self._sum_lengths = runtime.bind("generation/offsets.cl", "sum_lengths", **shared)
             self._place_lists = runtime.bind(
@@ -147,12 +156,9 @@ class GrowingLists:
         return self
 
     def __exit__(self, *_: object) -> None:
-        try:
-            self._runtime.finish()  # the arrays may go when nothing is written into them any more
-        finally:
-            self._release_targets()
-            for buffer in (self._sums, self._starts):
-                buffer.release()
+        self._release_targets()
+        for buffer in (self._sums, self._starts):
+            buffer.release()
 
     def follow(self, lengths: DeviceBuffer, n: int) -> dict[str, Any]:
         """Find where the next n lists go, of which there are so many lengths, on the device.
@@ -192,10 +198,9 @@ class GrowingLists:
         self.wait()
         if self._begin > 0 or self._runtime.in_place_alignment is not None:
             return self.finished()
-        self._runtime.download(self._starts, self._offsets)
         buffers, self._targets = {"starts": self._starts, **self._targets}, {}
         self._starts = self._sums  # all that is to be released
-        return ListsOnDevice(self._runtime, self._offsets, buffers)
+        return ListsOnDevice(self._runtime, self._offsets, self._known, buffers)
 
     def _make_room(self, begin: int, end: int) -> None:
         """Make buffers of the supersegments from ``begin``, those made so far, to ``end``."""
@@ -210,8 +215,7 @@ class GrowingLists:
             array.reserve(end, self._most)
         begin -= begin % alignment  # so many elements are aligned as well
         room = min(array.room for array in self._arrays.values())
-        largest = self._runtime.info.max_allocation // _LARGEST_ELEMENT
-        self._begin, self._end = begin, max(end, min(room, begin + largest))
+        self._begin, self._end = begin, max(end, min(room, begin + self._largest))
         for name, array in self._arrays.items():
             part: NDArray[Any] = array.part(begin, self._end)
             self._targets[name] = self._runtime.target(part, _ARRAYS[name][0])
@@ -220,11 +224,9 @@ class GrowingLists:
         """Wait until so many supersegments are in the host's arrays; in place, release buffers."""
         in_place = self._runtime.in_place_alignment is not None
         for name, target in self._targets.items():
-            array = self._arrays[name]
             if not in_place:
-                array.reserve(made, self._most)
-            filled = array.part(self._begin, made)
-            self._runtime.download(target, filled)
+                self._arrays[name].reserve(made, self._most)
+            self._runtime.download(target, self._arrays[name].part(self._begin, made))
         if in_place:
             self._release_targets()
 

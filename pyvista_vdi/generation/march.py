@@ -67,7 +67,7 @@ class Records:
         items, capacity = slices.items, slices.capacity
         with ExitStack() as stack:
             keep = stack.enter_context
-            self.forms = keep(runtime.upload(march.packed(), "rays"))
+            self.forms = keep(runtime.upload(march.packed(), "rays", brief=True))
             self.runs = keep(runtime.buffer((items, capacity, RUN_WORDS), name="recorded runs"))
             self.errors = keep(runtime.buffer((items, capacity), name="merge errors"))
             self.thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
@@ -104,7 +104,6 @@ class Records:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.runtime.finish()  # the forms may be host memory that the device still reads
         self._buffers.close()
 
     def begin(self, part: Slice) -> None:

@@ -5,15 +5,14 @@ On a device: ``lib/values.cl``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import UnsupportedError, warn_external
-from pyvista_vdi.model.checks import as_range
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.deferred import DeferredVDI, Floats
 from pyvista_vdi.model.packing import Arrays
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
@@ -40,7 +39,7 @@ def classify(
 
     The opacity of a step of the march, and its colour weighted by opacity, are their means over the
     values of :func:`spread_of_values`. The VDI's arrays are made when they are asked for, by
-    ``media`` if it is given; a raycast asks for none. Errors and warnings are those of
+    ``media`` if it is given; a raycast asks for none. Errors are those of
     :meth:`DeferredVDI.classified`.
     """
     for name, asked in (
@@ -52,16 +51,21 @@ def classify(
                 f"{name} needs gradients, which a DeferredVDI does not keep: leave it out, or "
                 "generate with the transfer function and classification='baked'"
             )
-    _warn_outside(deferred, transfer_function)
 
     # A step's opacity, and the colour times it, at the low end of the range and in cells of it
     low, high = deferred.value_range
     unit = transfer_function.unit_distance or deferred.unit_distance
     values = low + (np.arange(-1, CELLS) + 0.5).clip(0) / CELLS * (high - low)
-    color, opacity = looked_up(transfer_function, values)
+    first, last = transfer_function.scalar_range
+    nodes = np.arange(len(transfer_function.opacities))
+    place = np.where(values > last, nodes[-1], 0.0)
+    if last > first:
+        place = (values - first) / (last - first) * nodes[-1]
+    columns = (*transfer_function.colors.T, transfer_function.opacities)
+    *rgb, opacity = (np.interp(place, nodes, each.astype(np.float64)) for each in columns)
     with np.errstate(divide="ignore"):
         of_step = -np.expm1(np.log1p(-opacity) * deferred.sample_distance / unit)
-    of_cells = np.column_stack([of_step[:, np.newaxis] * color, of_step])
+    of_cells = np.stack([*(of_step * each for each in rgb), of_step], axis=1)
     metadata = {
         **deferred.metadata,
         "opacity_unit_distance": unit,
@@ -93,15 +97,18 @@ class ValuesLook:
             return arrays
         return arrays.take(np.searchsorted(rows, arrays.offsets.view(np.int64)), rows)
 
-    def optical_depths(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
-        """Return the optical depths of some of all supersegments, float32, by float64."""
-        return self.media_of(rows)[1]
-
     def media_of(self, rows: Any = slice(None)) -> Media:
         """Return straight colours, float32 (n, 3), and optical depths, float32 (n,); in float64."""
         deferred, of_cells = self.deferred, self.of_cells
         integrals = np.zeros((CELLS + 1, 4))
         np.cumsum(of_cells[1:], axis=0, out=integrals[1:])
+
+        def integral(place: Floats) -> Floats:
+            """Return integrals up to places in cells: within a cell the extinction is the same."""
+            cell = np.minimum(place.astype(np.int64), CELLS - 1)
+            share = (place - cell)[:, np.newaxis]
+            return integrals[cell] * (1 - share) + integrals[cell + 1] * share
+
         mean, spread = (a[rows].astype(np.float64) for a in (deferred.mean, deferred.spread))
         low, high, even, above = spread_of_values(mean, spread)
         means = (1 - even - above)[:, np.newaxis] * of_cells[0]
@@ -109,7 +116,7 @@ class ValuesLook:
             # Over a cell at least
             widening = np.maximum(0.5 / CELLS - (last - first) / 2, 0)
             ends = [np.clip(x, 0, 1) * CELLS for x in (first - widening, last + widening)]
-            between = _integral(integrals, ends[1]) - _integral(integrals, ends[0])
+            between = integral(ends[1]) - integral(ends[0])
             means += between * (share / (ends[1] - ends[0]))[:, np.newaxis]
         of_step = np.minimum(means[:, 3], -np.expm1(-OPAQUE_OPTICAL_DEPTH))
         optical_depth = (-np.log1p(-of_step) * deferred.steps[rows]).astype(np.float32)
@@ -149,53 +156,3 @@ def spread_of_values(mean: Floats, spread: Floats) -> tuple[Floats, Floats, Floa
     above = np.where(inside | at_low, 0, below / np.maximum(1 - mean + below, tiny))
     even = np.where(at_low, 2 * mean / np.maximum(to, tiny), 1 - above)
     return low, high, np.where(inside, 1, even), above
-
-
-def _integral(integrals: Floats, place: Floats) -> Floats:
-    """Return integrals up to places in cells: within a cell the extinction is the same."""
-    cell = np.minimum(place.astype(np.int64), CELLS - 1)
-    share = (place - cell)[:, np.newaxis]
-    return integrals[cell] * (1 - share) + integrals[cell + 1] * share
-
-
-def _warn_outside(deferred: DeferredVDI, transfer_function: TransferFunction) -> None:
-    """Warn where a transfer function shows values that are not kept, with their share."""
-    volume = deferred.metadata.get("volume")
-    stored = volume.get("scalar_range") if isinstance(volume, Mapping) else None
-    least, largest = as_range(stored or transfer_function.scalar_range)
-    if not (np.isfinite(least) and np.isfinite(largest) and least < largest):
-        return
-    low, high = deferred.value_range
-    # Sample at the function's nodes, too, which may span a small part of the volume's range
-    first, last = transfer_function.scalar_range
-    nodes = np.linspace(first, last, len(transfer_function.opacities))
-    places = np.concatenate([np.linspace(least, largest, 4097), nodes.clip(least, largest)])
-    values = np.unique(places)
-    if len(values) < 2:
-        return
-    opacity = looked_up(transfer_function, values)[1] * np.gradient(values)
-    kept = (values >= low) & (values <= high)
-    outside = opacity[~kept].sum()
-    if outside > 1e-3 * opacity.sum():
-        warn_external(
-            f"the transfer function shows values outside {low:g} to {high:g}, which this "
-            f"VDI does not keep: {outside / opacity.sum():.1%} of its opacity from "
-            f"{least:g} to {largest:g}; generate with a wider value_range, or lower the opacity "
-            "there"
-        )
-
-
-def looked_up(transfer_function: TransferFunction, values: Floats) -> tuple[Floats, Floats]:
-    """Return colours (n, 3) and opacities (n,) of scalars, float64."""
-    low, high = transfer_function.scalar_range
-    entries = len(transfer_function.opacities)
-    if high > low:
-        place = (values - low) / (high - low) * (entries - 1)
-    else:
-        place = np.where(values > low, entries - 1.0, 0.0)
-    nodes = np.arange(entries)
-    columns = [
-        np.interp(place, nodes, column.astype(np.float64))
-        for column in (*transfer_function.colors.T, transfer_function.opacities)
-    ]
-    return np.stack(columns[:3], axis=1), columns[3]

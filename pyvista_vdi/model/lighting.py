@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_flag, as_float, as_vector, not_taken, one_of
+from pyvista_vdi.model.checks import Number, as_flag, as_vector, one_of
 
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -212,7 +212,5 @@ class Lights:
 
 
 def _number(name: str, value: Any) -> float:
-    number = as_float(value)
-    if not math.isfinite(number):
-        raise not_taken(value)(f"{name} must be a finite number; got {value!r}")
-    return number
+    check = Number("a finite number", -math.inf, open_ended=True, name=name)
+    return check(value)  # type: ignore[no-any-return]

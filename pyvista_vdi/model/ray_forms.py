@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_floats
-from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.host_memory import aligned_empty
+from pyvista_vdi.model.view import bounds_corners
 
 Floats: TypeAlias = NDArray[np.float64]
 

@@ -17,17 +17,26 @@ from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
 from pyvista_vdi.model.host_memory import require_host_memory
 
 
-class Geometry:
-    """What follows from a uniform grid's points, spacing, origin and direction."""
+@dataclass(eq=False)
+class Grid:
+    """A uniform grid, without values.
 
+    ``dimensions``: points along x, y and z. ``spacing``, ``origin``: as of a :class:`Volume`, model
+    units. ``direction`` (float64 (3, 3)): columns are the directions of the index axes.
+    ``unit_distance``: the opacity unit distance by default, if not that of these points: a level of
+    a multi-scale store has the finest level's, so that all levels look the same; model units.
+    """
+
+    dimensions: tuple[int, int, int]
     spacing: tuple[float, float, float]
     origin: tuple[float, float, float]
     direction: NDArray[np.float64]
-    #: Number of points along x, y and z.
-    dimensions: tuple[int, int, int]
-    #: What the opacity unit distance is by default, if not that of these points: a level of a
-    #: multi-scale store has the finest level's, so that all levels look the same; model units.
     unit_distance: float | None = None
+
+    @classmethod
+    def of(cls, grid: Grid) -> Grid:
+        """Return the grid of a volume."""
+        return cls(grid.dimensions, grid.spacing, grid.origin, grid.direction, grid.unit_distance)
 
     @functools.cached_property
     def index_to_model(self) -> NDArray[np.float64]:
@@ -61,56 +70,17 @@ class Geometry:
         return self.length / (float(np.mean(self.dimensions)) - 1)
 
 
-@dataclass(frozen=True)
-class Grid(Geometry):
-    """A uniform grid without its values.
-
-    ``dimensions``: points along x, y and z. ``spacing``, ``origin``: as of a
-    :class:`~pyvista_vdi.model.volume.Volume`, model units. ``direction`` (float64 (3, 3)): columns
-    are the directions of the index axes. ``unit_distance``: in place of
-    :attr:`default_unit_distance`.
-    """
-
-    dimensions: tuple[int, int, int]
-    spacing: tuple[float, float, float]
-    origin: tuple[float, float, float]
-    direction: NDArray[np.float64]
-    unit_distance: float | None = None
-
-    @classmethod
-    def of(cls, geometry: Geometry) -> Grid:
-        """Return the grid of a volume."""
-        return cls(
-            geometry.dimensions,
-            geometry.spacing,
-            geometry.origin,
-            geometry.direction,
-            geometry.unit_distance,
-        )
-
-
 #: Voxel types that the kernels read as they are.
-VOXEL_TYPES: tuple[str, ...] = (
-    "uint8",
-    "int8",
-    "uint16",
-    "int16",
-    "uint32",
-    "int32",
-    "float32",
-    "float64",
-)
+VOXEL_TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
 
 #: Attributes by which arrays in files say that their values are others than those that are stored.
 _PACKING = ("scale_factor", "add_offset", "_Unsigned")
-#: Attributes with numbers that stand for nothing, and what xarray writes for NaN in zarr 3.
-_MISSING, _NAN = ("_FillValue", "missing_value"), "AAAAAAAA+H8="
 
 #: Types that one of those represents without loss for every value they can hold.
 _WIDENED = {"bool": "uint8", "float16": "float32"}
 
 
-class Volume(Geometry):
+class Volume(Grid):
     """Scalars, or colours with opacity, at the points of a uniform grid.
 
     The grid's model coordinates are ``origin + direction @ (spacing * (x, y, z))`` for the point
@@ -132,7 +102,7 @@ class Volume(Geometry):
         Columns are the directions of the x, y and z index axes; identity by default.
     name : str
         What the scalars are called.
-    blanked : array_like of uint8, shape (nz, ny, nx), optional
+    blanked : numpy.ndarray of uint8, shape (nz, ny, nx), optional
         What is not drawn: a bit for each octant, half a voxel long, around each point. The
         octant above the point along x has 1 in its number, that above it along y 2, along z 4.
 
@@ -157,7 +127,7 @@ class Volume(Geometry):
         direction: ArrayLike | None = None,
         *,
         name: str = "values",
-        blanked: ArrayLike | None = None,
+        blanked: NDArray[np.uint8] | None = None,
     ) -> None:
         self.array = chunked_array(array) if is_chunked(array) else _checked_array(array)
         nz, ny, nx = self.array.shape[:3]
@@ -165,22 +135,33 @@ class Volume(Geometry):
         self.spacing = as_vector(spacing, "spacing", error=InvalidVolumeError)
         self.origin = as_vector(origin, "origin", error=InvalidVolumeError)
         matrix = np.eye(3) if direction is None else as_floats(direction)
-        if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
-            raise InvalidVolumeError(f"direction must be 3 x 3 finite numbers; got {direction!r}")
-        if abs(np.linalg.det(matrix)) < 1e-9:
+        finite = matrix.shape == (3, 3) and np.isfinite(matrix).all()
+        if not finite or abs(np.linalg.det(matrix)) < 1e-9:
             raise InvalidVolumeError(
-                f"the direction matrix {matrix.tolist()} cannot be inverted: its columns must be "
-                "three independent directions"
+                "direction must be 3 x 3 finite numbers, three independent directions as columns; "
+                f"got {direction!r}"
             )
         matrix.setflags(write=False)
         self.direction = matrix
-        self.name = str(name)
-        self.blanked = None if blanked is None else self._checked_blanked(blanked)
+        self.name, self.blanked = str(name), blanked
         if min(self.spacing) <= 0:
             raise InvalidVolumeError(
                 f"spacing must be positive along each axis; got {self.spacing}: "
                 "flip the array (or the direction matrix) instead of a negative spacing"
             )
+        if blanked is None:
+            return
+        if self.chunked:
+            raise UnsupportedError(
+                "blanked is of volumes in memory, and this one is read chunk by chunk: load it "
+                "(Volume.load()), or write NaN where it is blank"
+            )
+        if getattr(blanked, "dtype", None) != np.uint8 or blanked.shape != self.array.shape[:3]:
+            raise InvalidVolumeError(
+                f"blanked must be uint8 of shape {self.array.shape[:3]}, a bit for each octant; "
+                f"got {blanked!r}"
+            )
+        self.blanked = np.ascontiguousarray(blanked)
 
     @staticmethod
     def from_vtk(image: Any, scalars: str | None = None, preference: str = "point") -> Volume:
@@ -217,32 +198,9 @@ class Volume(Geometry):
         return self.array.ndim == 4
 
     @property
-    def chunks(self) -> ChunkedArray | None:
-        """What reads the voxels chunk by chunk; ``None`` where they are in memory."""
-        array: Any = self.array
-        return array if isinstance(array, ChunkedArray) else None
-
-    @property
     def chunked(self) -> bool:
         """Whether the voxels are read chunk by chunk: VDIs are then made block by block."""
-        return self.chunks is not None
-
-    def _checked_blanked(self, blanked: ArrayLike) -> NDArray[np.uint8]:
-        try:
-            octants = np.ascontiguousarray(blanked)
-        except ValueError:  # lists of several lengths
-            octants = np.empty(0)
-        if self.chunked:
-            raise UnsupportedError(
-                "blanked is of volumes in memory, and this one is read chunk by chunk: load it "
-                "(Volume.load()), or write NaN where it is blank"
-            )
-        if octants.dtype != np.uint8 or octants.shape != self.array.shape[:3]:
-            raise InvalidVolumeError(
-                f"blanked must be uint8 of shape {self.array.shape[:3]}, a bit for each octant; "
-                f"got {octants.dtype} of shape {octants.shape}"
-            )
-        return octants
+        return isinstance(self.array, ChunkedArray)
 
     def load(self) -> Volume:
         """Return the volume with all its voxels in memory."""
@@ -293,8 +251,9 @@ class Volume(Geometry):
 
     @functools.cached_property
     def _range(self) -> tuple[float, float]:
-        if self.chunks is not None:
-            return self.chunks.ends
+        array: Any = self.array
+        if self.chunked:
+            return array.ends  # type: ignore[no-any-return]
         if self.array.dtype.kind != "f":
             return float(self.scalars.min()), float(self.scalars.max())
         low, high = np.fmin.reduce(self.array, axis=None), np.fmax.reduce(self.array, axis=None)
@@ -314,10 +273,7 @@ def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any
     """
     if isinstance(array, ChunkedArray):
         return array
-    attributes = getattr(array, "attrs", {})
-    said = [name for name in _PACKING if name in attributes]
-    said += [name for name in _MISSING if name in attributes and not _is_nan(attributes[name])]
-    if said:
+    if said := [name for name in _PACKING if name in getattr(array, "attrs", {})]:
         raise InvalidVolumeError(
             f"the array's values are packed ({', '.join(said)}): open it by xarray, which unpacks "
             'them, and give pyvista_vdi.Volume(dataset["name"].data)'
@@ -329,15 +285,11 @@ def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any
     return found
 
 
-def _is_nan(said: Any) -> bool:
-    return said == _NAN if isinstance(said, str) else bool(np.isnan(as_floats(said)).all())
-
-
 def _check_planes(shape: tuple[int, ...]) -> None:
     if min(shape[:3]) < 2:
         raise InvalidVolumeError(
-            f"the volume has only one plane of points: its shape is {shape[:3]} (z, y, x), "
-            "and a volume needs at least two points along each axis"
+            f"the volume has only one plane of points, or none: its shape is {shape[:3]} "
+            "(z, y, x), and a volume needs at least two points along each axis"
         )
 
 
@@ -362,16 +314,10 @@ def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
         raise InvalidVolumeError(f"a volume is an array of numbers: {error}") from error
     rgba = array.ndim == 4 and array.shape[-1] == 4 and array.dtype == np.uint8
     if array.ndim != 3 and not rgba:
-        hint = (
-            ": give one scalar per point, indexed [z, y, x], or RGBA as four uint8"
-            if array.ndim == 4
-            else ""
-        )
         raise InvalidVolumeError(
-            f"a volume is a three-dimensional array; got shape {array.shape}{hint}"
+            "a volume is a three-dimensional array, one scalar per point, indexed [z, y, x], or "
+            f"RGBA as four uint8 per point; got shape {array.shape}"
         )
-    if array.size == 0:
-        raise InvalidVolumeError(f"the volume is empty: its shape is {array.shape}")
     _check_planes(array.shape)
     kind, long = _voxel_type(array.dtype)
     return _from_long_integers(array) if long else np.ascontiguousarray(array, dtype=kind)

@@ -58,6 +58,9 @@ class Setting:
         return request.replace(options=options, window_size=(width, height))
 
 
+#: Degrees by which the view is turned from V_O for which the SSIM is predicted.
+TARGET_ANGLE = 30.0
+
 #: What is chosen from. No rung has fewer or shorter lists than the one before it.
 LADDER = (
     Setting(1 / 4, 10),
@@ -103,7 +106,7 @@ def refuse_settings(target: QualityTarget, options: GenerationOptions) -> None:
     """Refuse options that are chosen for a target where they do not have their defaults."""
     fixed = [f"{name}={value!r}" for name, value in options.given.items() if name in _CHOSEN]
     if fixed:
-        asked = ", ".join(f"{name}={value!r}" for name, value in target.to_dict().items())
+        asked = ", ".join(f"{name}={value!r}" for name, value in target.given.items())
         raise InvalidArgumentError(
             f"{asked} chooses the settings of the VDI, among them {', '.join(fixed)}: leave out "
             "one or the other"
@@ -160,7 +163,7 @@ def generate_to_target(request: GenerationRequest, target: QualityTarget) -> VDI
     if target.quality is not None and target.full_fps is None and target.max_bytes is None:
         vdi = generate_vdi(LADDER[rung].applied_to(request))
         return _described(vdi, rung, target, request.window_size, {"ssim": ssim}, [])
-    trials = _Trials(request, target.target_angle)
+    trials = _Trials(request)
     # A name means its rung, a number the first that reaches it
     goal = 0.0 if target.ssim is None or target.quality is not None else target.ssim
     if goal > 0:
@@ -186,14 +189,14 @@ def generate_to_target(request: GenerationRequest, target: QualityTarget) -> VDI
                 "pixels)"
             )
     rung = max(rung, 0)
-    vdi, ssim, given = trials.vdi(rung), trials.ssim(rung), target.to_dict()
+    vdi, ssim, given = trials.vdi(rung), trials.ssim(rung), target.given
     if target.ssim is not None and (rung < wanted or ssim < goal):
         limits = " and ".join(f"{n}={given[n]}" for n in ("max_bytes", "full_fps") if n in given)
         asked = next(f"{n}={given[n]!r}" for n in ("quality", "target_ssim") if n in given)
         missed.append(
-            f"{asked} is not reached at {target.target_angle:g} degrees: SSIM is {ssim:.3f} for "
+            f"{asked} is not reached at {TARGET_ANGLE:g} degrees: SSIM is {ssim:.3f} for "
             + (f"what is within {limits}; allow more" if rung < wanted else "the best settings")
-            + ", ask for less, or for a smaller angle"
+            + ", ask for less"
         )
     fps = float(f"{trials.fps(rung):.3g}")
     predicted = {"ssim": round(ssim, 4), "bytes": bytes_of(vdi), "fps": fps}
@@ -218,8 +221,8 @@ def _described(
 ) -> VDI:
     """Return a VDI whose metadata say what was chosen: see docs/dial.md."""
     vdi.metadata["dial"] = {
-        "asked": target.to_dict(),
-        "angle": target.target_angle,
+        "asked": target.given,
+        "angle": TARGET_ANGLE,
         "window_size": list(size),
         "chosen": {
             "window_size": list(vdi.window_size),
@@ -235,7 +238,7 @@ def _described(
 class _Trials:
     """VDIs of the rungs, each made when it is asked for, and what they give in the target view."""
 
-    def __init__(self, request: GenerationRequest, angle: float) -> None:
+    def __init__(self, request: GenerationRequest) -> None:
         size = request.window_size
         if min(size) < SSIM_WINDOW:
             raise InvalidArgumentError(
@@ -243,7 +246,7 @@ class _Trials:
                 f"takes {SSIM_WINDOW} along each edge; choose max_supersegments and window yourself"
             )
         self.request = request.replace(device=get_runtime(request.device))
-        camera = turned(request.camera, request.volume.bounds, angle)
+        camera = turned(request.camera, request.volume.bounds, TARGET_ANGLE)
         self.view = FrameRequest(camera, size, device=self.request.device)
         self.vdi, self.ssim, self.fps = cache(self._vdi), cache(self._ssim), cache(self._fps)
 

@@ -20,12 +20,12 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidCameraError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
@@ -48,8 +48,6 @@ _COARSE_LAUNCH = 8192
 #: Arguments of ``structural_similarity`` for the coarse pictures: a window of 5 of their pixels.
 _COARSE_SSIM = {**SSIM_ARGUMENTS, "sigma": 0.7}
 _COARSE_WINDOW = 5
-#: Edge in pixels of the blocks within which contrast is compared.
-_BLOCK = 4
 #: Weight of a difference between the coarse pictures against detail within one.
 _DIFFERENCE_WEIGHT = 3.0
 #: Share of the tiles that are spread evenly, whatever the coarse pictures show.
@@ -66,7 +64,6 @@ class ViewError:
     angle: float  # degrees, see angle_from_generating_view()
     magnification: float  # pixels per list, see magnification()
     tiles: int  # that were rendered; 0 where the volume is not in view
-    contrast: float = 1.0  # within 4 x 4 pixels over the volume's: below 1 where detail is missing
 
 
 class ViewErrorEstimator:
@@ -130,8 +127,7 @@ class ViewErrorEstimator:
             return ViewError(1.0, *where, 0)
         old, new = self.tiles(sample, request, vdi), self.tiles(sample, request)
         ssim = sample.infer(tiles_ssim(old, new, background))
-        contrast = contrast_ratio(old, new, 1 / sample.chances, background)
-        return ViewError(ssim, *where, len(new), contrast)
+        return ViewError(ssim, *where, len(new))
 
     def sample(
         self, vdi: VDI, request: FrameRequest, background: Sequence[float] = (0.0, 0.0, 0.0)
@@ -299,27 +295,6 @@ def tiles_ssim(
     inner = slice(REACH, -REACH)
     by_tile = ssim.reshape(len(new), *new[0].shape[:2], 3)[:, inner, inner]
     return np.asarray(by_tile.mean(axis=(1, 2, 3)))
-
-
-def contrast_ratio(
-    old: Sequence[Picture],
-    new: Sequence[Picture],
-    weights: Floats,
-    background: Sequence[float] = (0.0, 0.0, 0.0),
-) -> float:
-    """Return the contrast of tiles within blocks of pixels over that of others, weighted by tile.
-
-    It is the mean standard deviation of a channel within 4 x 4 pixels; 1 where neither has any.
-    """
-    sums = []
-    for tiles in (old, new):
-        height, width = tiles[0].shape[:2]
-        n, high, wide = len(tiles), height // _BLOCK, width // _BLOCK
-        pictures = over_background(np.concatenate(tiles), background)
-        blocks = pictures.reshape(n, height, width, 3)[:, : high * _BLOCK, : wide * _BLOCK]
-        blocks = blocks.reshape(n, high, _BLOCK, wide, _BLOCK, 3)
-        sums.append(float(weights @ blocks.std(axis=(2, 4)).mean(axis=(1, 2, 3))))
-    return sums[0] / sums[1] if sums[1] > 0 else 1.0
 
 
 class Cells:

@@ -225,9 +225,7 @@ def owned_image(
             needed = merged.draw(cells.shared, slots, image, owner)
             for one in placed:
                 _slots[one.vdi] = math.ceil(_SPARE_SLOTS * max(needed, 1))
-        result = OwnedImage(runtime.download(image), runtime.download(owner))
-        runtime.finish()  # arrays on the device may be host memory in use
-        return result
+        return OwnedImage(runtime.download(image), runtime.download(owner))
 
 
 def _merged(options: RenderOptions) -> RenderOptions:
@@ -291,7 +289,7 @@ def _draw_alone(
     group = (_CELLS_OF_GROUP, 1)
     items = padded((wide, size[1]), group)
     with contextlib.ExitStack() as stack:
-        alone = stack.enter_context(runtime.upload(cells.alone, "cells"))
+        alone = stack.enter_context(runtime.upload(cells.alone, "cells", brief=True))
         window = {"alone": alone, "cells_wide": wide, "width": size[0], "height": size[1]}
         end_rays = runtime.bind("multi_vdi/cells.cl", "alone_ends", **window)
         take = runtime.bind("multi_vdi/cells.cl", "take_cells", **window, image=image, owner=owner)
@@ -310,7 +308,6 @@ def _draw_alone(
             take(items, group, vdi=number, picture=picture)
         if (cells.alone == cells.NOBODY).any():
             take(items, group, vdi=cells.NOBODY, picture=image)
-        runtime.finish()  # the buffers above may be host memory in use
 
 
 class _MergedCells:
@@ -378,8 +375,8 @@ class _MergedCells:
             runtime.result((streams, rays), np.uint8, "VDIs met") as contributes,
             runtime.result((rays,), name="ends of light") as dark,
             runtime.buffer((len(cells),), np.int32, "slots needed") as needed,
-            runtime.upload(cells, "cells") as of_cells,
-            runtime.upload(self._streams_of, "order of the VDIs") as streams_of,
+            runtime.upload(cells, "cells", brief=True) as of_cells,
+            runtime.upload(self._streams_of, "order of the VDIs", brief=True) as streams_of,
         ):
             runtime.fill(needed, np.int32(0))
             written = {"pool": pool, "ends": ends, "contributes": contributes}

@@ -9,7 +9,7 @@ from functools import partial, reduce
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together, padded
 from pyvista_vdi.device.constants import BUNDLE, FIRST_BITS, GROUP, LIST_HEADER, SLABS, STACK
@@ -241,7 +241,6 @@ class PreparedVDI:
                 "centre_ray": keep(runtime.upload(centre.astype(np.float32), "centre rays")),
             }
             self._prepare(vdi, keep)
-            runtime.finish()  # what was uploaded may be host memory in use
 
     @property
     def list_bytes(self) -> int:
@@ -303,16 +302,18 @@ class PreparedVDI:
             self.occupancy = OccupancyGrid(self, count)
             keep(self.occupancy.counts), keep(self.occupancy.masks)
 
-            # Prepare: depth coordinates and extinctions by bundles, or lists behind their scales
+            # Prepare: depth coordinates and extinctions by bundles, or lists behind their scales. A
+            # CPU writes them in our own memory, which systems give in large pages, a driver's in
+            # small ones
             arguments: dict[str, Any] = {**self._common, **held}
             if packing is not None:
                 self.faces = self.media = keep(
-                    self._made((max(1, self._entries), 2), "supersegments", np.uint32)
+                    runtime.result((max(1, self._entries), 2), np.uint32, "supersegments")
                 )
                 arguments |= {"stored": held["words"], "words": self.faces}
             else:
-                self.faces = keep(self._made((self._entries, 2), "supersegment faces"))
-                self.media = keep(self._made((self._entries, 4), "supersegment media"))
+                self.faces = keep(runtime.result((self._entries, 2), name="supersegment faces"))
+                self.media = keep(runtime.result((self._entries, 4), name="supersegment media"))
                 arguments |= {"depth_origin": self.depth_origin, "nearest": self.nearest}
                 arguments |= {"faces": self.faces, "media": self.media}
             kernel = "prepare_packed" if packing is not None else "prepare_lists"
@@ -321,14 +322,6 @@ class PreparedVDI:
             runtime.finish()  # the buffers above may be host memory in use
         if runtime.is_cpu:
             self.lit = share_lit(vdi, *self.depths)
-
-    def _made(self, shape: tuple[int, ...], name: str, dtype: DTypeLike = "f4") -> DeviceBuffer:
-        """Return memory for kernels to write.
-
-        On a CPU device it is our own, which systems give in large pages: a driver's comes in pages
-        of 4 KiB, each of which the kernel is interrupted for where it first writes.
-        """
-        return self.runtime.result(shape, dtype, name, lasting=True)
 
     def _ends(self, vdi: VDI, held: dict[str, Any]) -> NDArray[np.float32]:
         """Return the first front and the last back of the lists that are not empty, (n, 2)."""
@@ -392,14 +385,14 @@ class KeptValues(PreparedVDI):
         """Return what a transfer function shows: what is transparent is left out."""
         runtime, shown, bundles = self.runtime, copy.copy(self), self.headers.shape[0]
         if runtime.is_cpu:
-            shown.lit = share_lit(self._lists, *self.depths, look.optical_depths)
+            shown.lit = share_lit(self._lists, *self.depths, lambda rows: look.media_of(rows)[1])
         with (
             kept_together() as keep,
             runtime.upload(look.integrals(), "integrals of a transfer function") as table,
         ):
-            shown.headers = keep(self._made((bundles,), "list headers", np.uint64))
-            shown.faces = keep(self._made((self._entries, 2), "supersegment faces"))
-            shown.media = keep(self._made((self._entries, 4), "supersegment media"))
+            shown.headers = keep(runtime.result((bundles,), np.uint64, "list headers"))
+            shown.faces = keep(runtime.result((self._entries, 2), name="supersegment faces"))
+            shown.media = keep(runtime.result((self._entries, 4), name="supersegment media"))
             prepare = runtime.bind(
                 "raycasting/prepare_values.cl",
                 "prepare_values",

@@ -1,11 +1,11 @@
 """A VDI in a frame: the rays in its list space, as kernels take them."""
 
-import contextlib
 import itertools
 import math
 from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -199,14 +199,12 @@ class Scene:
             long_vectors=self.prepared.runtime.vector_floats >= 16,
         )
 
-    @contextlib.contextmanager
+    @contextmanager
     def on_device(self) -> Iterator[OnDevice]:
         """Upload the forms and the ends of rays for a ``with`` block."""
-        runtime = self.prepared.runtime
-        with runtime.upload(self.forms, "rays") as forms, contextlib.ExitStack() as stack:
-            ends = None
-            if self.ends is not None:
-                ends = stack.enter_context(runtime.upload(self.ends, "opaque depth"))
+        upload = partial(self.prepared.runtime.upload, brief=True)
+        opaque: Any = nullcontext() if self.ends is None else upload(self.ends, "opaque depth")
+        with opaque as ends, upload(self.forms, "rays") as forms:
             yield forms, ends
 
     def arguments(self, forms: DeviceBuffer, ends: DeviceBuffer | None) -> dict[str, Any]:

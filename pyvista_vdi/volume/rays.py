@@ -18,7 +18,7 @@ from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.float32_limits import MOST_STEPS, enters_far_away
 from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed, packed_double_float
 from pyvista_vdi.model.render_options import Planes
-from pyvista_vdi.model.volume import Geometry, Grid
+from pyvista_vdi.model.volume import Grid
 
 Ends = tuple[float, float, float]
 
@@ -66,7 +66,7 @@ class MarchForms:
 class GridRays:
     """A grid that rays are marched through, and the lengths of their steps; model units."""
 
-    grid: Geometry
+    grid: Grid
     sample_distance: float
     unit_distance: float
 
@@ -109,7 +109,7 @@ class GridRays:
         }
 
 
-def checked_sample_distance(volume: Geometry, sample_distance: float | None) -> float:
+def checked_sample_distance(volume: Grid, sample_distance: float | None) -> float:
     """Return the length of a step in model units; half the smallest spacing by default."""
     least = volume.length / MOST_STEPS
     if sample_distance is None:

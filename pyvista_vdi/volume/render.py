@@ -1,8 +1,9 @@
 """Direct volume rendering on a device: the baseline that a VDI is measured against."""
 
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,10 +54,9 @@ class ClippedRays:
         self, runtime: Runtime, stack: ExitStack
     ) -> tuple[DeviceBuffer, DeviceBuffer | None]:
         """Return forms and ends on a device, as long as the stack is open."""
-        forms = stack.enter_context(runtime.upload(self.forms, "rays"))
-        if self.ends is None:
-            return forms, None
-        return forms, stack.enter_context(runtime.upload(self.ends, "opaque depth"))
+        upload = partial(runtime.upload, brief=True)
+        opaque: Any = nullcontext() if self.ends is None else upload(self.ends, "opaque depth")
+        return stack.enter_context(upload(self.forms, "rays")), stack.enter_context(opaque)
 
 
 def raycast_volume(

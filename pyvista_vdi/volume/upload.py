@@ -19,7 +19,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import LARGEST_POWER, LARGEST_VOXEL, scalars_suit_float32
 from pyvista_vdi.model.lighting import Light, Lights, Shading
 from pyvista_vdi.model.transfer_function import GRADIENT_SHARE, TransferFunction
-from pyvista_vdi.model.volume import Geometry, Volume
+from pyvista_vdi.model.volume import Grid, Volume
 from pyvista_vdi.volume.bricks import Room, in_parts
 from pyvista_vdi.volume.rays import Variant
 
@@ -368,7 +368,7 @@ def shading_variant(transfer_function: TransferFunction, lights: Lights) -> dict
 
 
 def lighting_table(
-    grid: Geometry, camera: Camera, shading: Shading, lights: Lights
+    grid: Grid, camera: Camera, shading: Shading, lights: Lights
 ) -> NDArray[np.float32]:
     """Return the material and the lights of a view.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 
 import pytest
@@ -150,8 +149,6 @@ print("all well")
 @pytest.mark.gl
 @pytest.mark.skipif(sys.platform != "linux", reason="folders and variables of Linux")
 def test_without_a_folder_that_can_be_written_it_draws_and_says_so_once(tmp_path):
-    folder = tmp_path / f"pyvista-vdi-{os.getuid()}"
-    folder.touch()
     variables = {"HOME": "/proc", "XDG_CACHE_HOME": "/proc/cache", "TMPDIR": str(tmp_path)}
     done = run_python(HEAD + HOMELESS, MPLCONFIGDIR=str(tmp_path), **variables)
     assert done.stdout == "all well\n", done.stdout + done.stderr

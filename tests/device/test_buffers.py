@@ -10,7 +10,7 @@ import pytest
 
 from pyvista_vdi import device as ocl
 from pyvista_vdi.device import devices
-from pyvista_vdi.errors import DeviceError, DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.errors import DeviceError, DeviceMemoryError
 
 DTYPES = ["u1", "i2", "f8"]
 
@@ -35,9 +35,6 @@ def test_upload_and_download(runtime, aligned):
             np.testing.assert_array_equal(
                 runtime.download(buffer, np.empty(7, dtype)), values.ravel()[:7]
             )
-            for change in (runtime.write, runtime.fill):
-                with pytest.raises(InvalidArgumentError, match="'values' was uploaded"):
-                    change(buffer, back if change == runtime.write else 0)
         assert runtime.allocated == before
 
 
@@ -80,12 +77,6 @@ def test_a_target_gets_what_kernels_write(runtime, aligned):
         elsewhere = np.empty_like(array)
         np.testing.assert_array_equal(runtime.download(buffer, elsewhere), np.full((40, 50), 0.5))
     assert runtime.allocated == before
-    for bad in (array[:, ::2], array.T):
-        with pytest.raises(InvalidArgumentError, match="'values' must be C-contiguous"):
-            runtime.target(bad, "values")
-    array.flags.writeable = False
-    with pytest.raises(InvalidArgumentError, match="writeable=False"):
-        runtime.target(array, "values")
 
 
 @pytest.fixture

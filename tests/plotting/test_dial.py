@@ -55,7 +55,7 @@ def test_views_regenerate_below_what_was_asked_for(plotter, arguments, bound):
 
 def test_a_source_makes_what_generate_makes():
     source = ready_source()
-    asked = {"max_bytes": 10**6, "target_angle": 20}
+    asked = {"max_bytes": 10**6}
     source.SetDial("high", **asked)
     assert source.GetDial() == QualityTarget("high", **asked)
     looks = {"volume_property": some_property()}

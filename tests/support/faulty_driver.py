@@ -1,7 +1,8 @@
-"""Drivers that fail when they are told to, and the scene that faults are tried on."""
+"""Drivers that fail when told to, or note what makes a host wait, and the scene of such tests."""
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import weakref
 
@@ -59,7 +60,7 @@ OPERATIONS = {
 
 
 class Driver:
-    """Counts calls of the driver's functions, and lets one of them fail."""
+    """Counts calls of the driver's functions, lets one of them fail, or notes those that wait."""
 
     def __init__(self, monkeypatch):
         self._cl = devices.opencl()
@@ -71,6 +72,7 @@ class Driver:
             monkeypatch.setattr(self._cl, name, self._wrapped(name, getattr(self._cl, name)))
         queue = self._cl.CommandQueue
         monkeypatch.setattr(queue, "finish", self._wrapped("finish", queue.finish))
+        self._patch = monkeypatch
 
     def _wrapped(self, name, function):
         def call(*args, **kwargs):
@@ -81,6 +83,64 @@ class Driver:
             return function(*args, **kwargs)
 
         return call
+
+    @contextlib.contextmanager
+    def noting(self):
+        """Note what keeps a host and a device from working at the same time, and what is copied.
+
+        (what, bytes) of each buffer made of host memory, release of memory that a command in the
+        queue may use, wait, and copy, which is "read" or "written" and may block.
+        """
+        cl, noted, in_use, arguments = self._cl, [], set(), {}
+        memory = cl.MemoryObjectHolder
+        flags = cl.mem_flags.COPY_HOST_PTR | cl.mem_flags.USE_HOST_PTR
+
+        def before(owner, name, note):
+            function = getattr(owner, name)
+
+            def call(*args, **kwargs):
+                note(*args, **kwargs)
+                return function(*args, **kwargs)
+
+            patch.setattr(owner, name, call)
+
+        def waits(what, nbytes=0):
+            noted.append((what, nbytes))
+            in_use.clear()
+
+        def makes(context, access, size=0, hostbuf=None):
+            if access & flags:
+                noted.append(("buffer of host memory", hostbuf.nbytes))
+
+        def takes(kernel, place, value):
+            given = arguments.setdefault(kernel.int_ptr, {})
+            given[place] = value.int_ptr if isinstance(value, memory) else None
+
+        def runs(queue, kernel, *_, **__):
+            in_use.update(arguments[kernel.int_ptr].values())
+
+        def releases(released):
+            if released.int_ptr in in_use:
+                noted.append(("release in use", released.size))
+
+        def copies(queue, dest, src, is_blocking=True, **_):
+            way, host = ("written", src) if isinstance(dest, memory) else ("read", dest)
+            if is_blocking:
+                waits(f"{way}, blocking", host.nbytes)
+                return
+            noted.append((way, host.nbytes))
+            in_use.update(each.int_ptr for each in (dest, src) if each is not host)
+
+        with self._patch.context() as patch:
+            before(cl, "Buffer", makes)
+            before(cl.Kernel, "set_arg", takes)
+            before(cl, "enqueue_nd_range_kernel", runs)
+            before(cl.MemoryObject, "release", releases)
+            before(cl, "enqueue_copy", copies)
+            before(cl, "enqueue_map_buffer", lambda *_, **__: waits("mapped"))
+            before(cl.CommandQueue, "finish", lambda queue: waits("finish"))
+            before(cl.Event, "wait", lambda event: noted.append(("wait", 0)))
+            yield noted
 
     def _fail(self):
         if callable(self._error):

@@ -12,10 +12,11 @@ from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_float, as_whole, memory_limit_bytes
+from pyvista_vdi.model.checks import as_float, as_whole
 from pyvista_vdi.model.collection import RATE
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import BackgroundThread, Job
 from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
@@ -136,6 +137,7 @@ class SeriesInput(SeveralInput):
         #: Steps per second, and whether one is shown after the other.
         self.rate, self.playing = RATE, False
         self._clock, self._loop = clock, True
+        self._changed: Callable[..., Any] | None = None  # tells the mapper that it plays
         # Places go on where the series begins anew: place p is step p modulo the steps
         self._place = self._from = 0
         self._since: float | None = None  # when the place before was due; None before a frame
@@ -149,7 +151,7 @@ class SeriesInput(SeveralInput):
 
     @property
     def step(self) -> int:
-        """Index of the step that is shown."""
+        """Index of the step that is shown; negative ones that are set are from the end."""
         return self._place % len(self.series)
 
     @step.setter
@@ -163,21 +165,16 @@ class SeriesInput(SeveralInput):
 
     @property
     def time(self) -> float:
-        """Time of the step that is shown."""
+        """Time of the step that is shown; of one that is set the nearest step is shown."""
         return self.series.times[self.step]
 
     @time.setter
     def time(self, time: float) -> None:
         self.step = self.series.nearest(time)
 
-    @property
-    def current(self) -> Any:
-        """The step that is shown, read now if it is not ready."""
-        return self._at(self.step)
-
     def vdi(self) -> VDI:
         """Return the step's VDI; of values what the property makes of them."""
-        step = self.current
+        step: Any = self._at(self.step)
         if isinstance(step, DeferredVDI) and self.prop is not None:
             if self._kept is None or (self._kept.deferred, self._kept.prop) != (step, self.prop):
                 self._kept = DeferredInput(step, self.prop)
@@ -188,7 +185,8 @@ class SeriesInput(SeveralInput):
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
         """The step's values, where it keeps them."""
-        return step if isinstance(step := self.current, DeferredVDI) else None
+        step: Any = self._at(self.step)
+        return step if isinstance(step, DeferredVDI) else None
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds of the step that was shown last, or of the first."""
@@ -208,31 +206,34 @@ class SeriesInput(SeveralInput):
         """Read for a device."""
         self.device = device
 
-    @property
-    def busy(self) -> bool:  # type: ignore[override]
-        """Whether it plays."""
-        return self.playing
-
-    @property
-    def period(self) -> int:  # type: ignore[override]
-        """Milliseconds between two looks at what goes on."""
-        return period_of(self.rate)
+    def watch(self, changed: Callable[..., Any] | None) -> None:
+        """Call this when it begins to play; ``None`` ends it."""
+        self._changed = changed
 
     def complaint(self, error: BaseException) -> str:
         """Return that a step is left out."""
         return f"a step is left out: {type(error).__name__}: {error}"
 
     def play(
-        self, rate: float = RATE, *, loop: bool = True, memory_limit: float | str | None = None
+        self, rate: float = RATE, *, loop: bool = True, memory_limit: int | None = None
     ) -> None:
-        """Go on from the step that is shown, or from the first where the last one is."""
+        """Show one step after the other, ``rate`` a second, from the one that is shown.
+
+        Time does not wait: steps that are not ready when theirs comes are left out. Without an
+        event loop, as off-screen, a frame shows the step of the moment; for a movie set
+        :attr:`time`. ``loop``: whether the first step follows the last. ``memory_limit``: bytes
+        that decoded steps may take; 1 GiB by default.
+        """
         if isinstance(rate, bool) or not 0 < as_float(rate) < math.inf:
             raise InvalidArgumentError(f"rate must be steps per second, above 0; got {rate!r}")
-        self.memory = memory_limit_bytes(memory_limit) or self.memory
+        self.memory = MediumOptions(memory_limit=memory_limit).memory_limit or self.memory
         self.rate, self._loop = as_float(rate), bool(loop)
+        self.period = period_of(self.rate)
         last = len(self.series) - 1
         self._begin(0 if not loop and self.step == last else self.step)
         self.playing = last > 0
+        if self._changed is not None:
+            self._changed()
 
     def pause(self) -> None:
         """Stay at the step that is shown."""

@@ -11,7 +11,7 @@ import numpy as np
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunked import closed, opened
-from pyvista_vdi.model.levels import required_level
+from pyvista_vdi.model.view import required_level
 from pyvista_vdi.model.volume import Grid, Volume, chunked_array
 
 #: The axes of OME-Zarr, in their order.

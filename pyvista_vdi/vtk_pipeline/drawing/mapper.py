@@ -26,13 +26,12 @@ COARSEST = 4.0
 def _on_start(mapper: Any, event: str) -> None:
     driver = mapper.driver
     driver.begin(mapper)
-    driver.box.begin(driver.actor)
+    driver.box.begin(driver.actor())
 
 
 def _on_end(mapper: Any, event: str) -> None:
-    driver = mapper.driver
-    driver.end()
-    driver.box.end()
+    mapper.driver.end()
+    mapper.driver.box.end()
 
 
 @with_settings
@@ -61,22 +60,19 @@ class VDIMapperMethods:
         return self._driver
 
     def own_source(self, what: str) -> VDISource:
-        """Return the source, which no other mapper draws from now on.
+        """Return the source.
 
         Raises
         ------
         UnsupportedError
             If there is none; ``what`` says what cannot be changed.
         """
-        source, shown = self.GetSource(), self.driver.input
-        if source is None or not isinstance(shown, SourceInput):
+        source = self.GetSource()
+        if source is None:
             raise UnsupportedError(
                 f"a VDI without its volume keeps {what}: generate another from the volume"
             )
-        if not shown.alone:
-            shown = shown.separate()
-            self.driver.set_input(shown)
-        return shown.source
+        return source
 
     def SetSampleDistance(self, distance: float) -> None:
         """Set the length of a step, model units, from which the VDI is regenerated."""
@@ -98,7 +94,7 @@ class VDIMapperMethods:
         self.SetInputData(args[-1])
 
     def SetInputData(self, data: Any) -> None:
-        """Draw a VDI, its canonical image, a series (:attr:`VDIActor.time`) or a set of VDIs."""
+        """Draw a VDI, its canonical image, a series (:attr:`VDIActor.player`) or a set of VDIs."""
         self._set_input(None if data is None else input_of(data))
 
     SetVDI = SetInputData
@@ -164,7 +160,7 @@ class VDIMapperMethods:
         theirs: Any = other
         shown = other.driver.input
         self.driver.set_input(None if shown is None else shown.shared())
-        self.driver.set(**vars(other.driver.settings))
+        self.driver.settings = other.driver.settings
         cropping = ("Cropping", "CroppingRegionPlanes", "CroppingRegionFlags")
         for name in ("Device", "MaximumImageSampleDistance", *cropping):
             getattr(self, f"Set{name}")(getattr(theirs, f"Get{name}")())

@@ -112,20 +112,16 @@ class Warnings:
     """Says each thing once, as a VDIWarning: exceptions cannot pass through VTK's renderer."""
 
     def __init__(self) -> None:
-        self._said: set[Hashable] = set()
+        self.said: set[Hashable] = set()
 
     def warn(
         self, message: str, error: BaseException | None = None, *, cause: Hashable = None
     ) -> None:
         """Warn, unless this, or its cause, was said before; a traceback goes to the log."""
         _log.debug("%s", message, exc_info=error)
-        if (cause or message) not in self._said:
-            self._said.add(cause or message)
+        if (cause or message) not in self.said:
+            self.said.add(cause or message)
             try:
                 warn_external(message)
             except VDIWarning:  # warnings are errors: the log is what is left
                 _log.error(message)
-
-    def forget(self) -> None:
-        """Forget what was said, so that it is said again if it comes up again."""
-        self._said.clear()

@@ -75,7 +75,7 @@ def _volumes_of(props: Any, assemblies: tuple[Any, ...] = ()) -> Iterator[ShownV
         elif isinstance(prop, vtkVolume):
             mapper = prop.GetMapper()
             driver = getattr(mapper, "driver", None)
-            own = driver if driver is not None and driver.actor is prop else None
+            own = driver if driver is not None and driver.actor() is prop else None
             yield ShownVolume(prop, mapper, own, assemblies)
 
 
@@ -165,10 +165,15 @@ class Window:
 
     def rate(self, settings: Any) -> float:
         """Return the frames per second to be kept while a hand moves, also before it does."""
-        if settings.target or self.moving:
-            return float(settings.target or self._window().GetDesiredUpdateRate())
+        if settings.target_fps or self.moving:
+            return float(settings.target_fps or self._window().GetDesiredUpdateRate())
         interactor = self._window().GetInteractor()
         return _RATE if interactor is None else max(1.0, interactor.GetDesiredUpdateRate())
+
+    @property
+    def interactor(self) -> Any:
+        """VTK's, or ``None``."""
+        return self._window().GetInteractor()
 
     @property
     def moving(self) -> bool:
