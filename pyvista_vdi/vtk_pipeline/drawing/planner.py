@@ -273,7 +273,7 @@ class Planner:
                 for_view = not (seen.stale or seen.chosen)
                 self.making = Making(request.content, planned.make, for_view)
                 self._asked = request
-                self.worker.put(vdi_job(request.generation, request.target))
+                self.worker.put(vdi_job(request, request.target))
         if planned.estimate:
             self._estimate(source, seen.view)
         if planned.update and frame is not None:

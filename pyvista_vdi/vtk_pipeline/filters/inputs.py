@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -267,11 +266,11 @@ class SourceInput(Input):
         """
         wanted = self.source.MakeRequest(view)
         camera, size = tile or (view.camera, view.size)
-        generating, lists = wanted.generating
-        extents = zip(generating.half_extent(lists), camera.half_extent(size), strict=True)
+        lists = wanted.window_size
+        extents = zip(wanted.camera.half_extent(lists), camera.half_extent(size), strict=True)
         pixels = math.prod(size) * math.prod(high / low for high, low in extents)
         if tile is not None or pixels > math.prod(lists) * (1 + ROUNDING):
-            wanted = replace(wanted, generating=(camera, size))
+            wanted = wanted.seen_from(camera, size)
         return wanted
 
     def take_camera(self, camera: Any, model_transform: NDArray[np.float64]) -> None:

@@ -52,39 +52,25 @@ from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData, vtkWeakRef
 
 
 @dataclass(frozen=True)
-class Request:
+class Request(GenerationRequest):
     """Everything that decides a VDI, read from the pipeline at one moment."""
 
-    volume: Volume
-    transfer_function: TransferFunction
-    screen: View
-    generating: tuple[Camera, tuple[int, int]]  # V_O and its window, after coverage
-    options: GenerationOptions
-    target: QualityTarget | None
-    device: Any
-    metadata: dict[str, Any]  # what is added to the VDI's
-    content: Any = field(repr=False)  # equal where what is generated from is, the view apart
+    screen: View = None  # type: ignore[assignment]  # what a frame shows it in, before coverage
+    target: QualityTarget | None = None
+    content: Any = field(default=None, repr=False)  # equal where only the view is another
     covered: bool = True  # as far as coverage asks
 
     @property
     def key(self) -> Any:
         """Equal where the VDIs would be equal."""
-        return (self.content, self.generating)
+        return self.content, self.camera, self.window_size
 
-    @property
-    def generation(self) -> GenerationRequest:
-        """What is asked of whatever generates."""
-        metadata, screen = self.metadata, self.screen
-        if self.generating != (screen.camera, screen.size):
-            metadata = {**metadata, "screen": screen_metadata(screen.camera, screen.size)}
-        return GenerationRequest(
-            self.volume,
-            self.transfer_function,
-            *self.generating,
-            self.options,
-            self.device,
-            metadata=metadata,
-        )
+    def seen_from(self, camera: Camera, window_size: tuple[int, int]) -> Request:
+        """Return the same from another V_O; the VDI's metadata say the screen's where that is."""
+        metadata = {name: entry for name, entry in self.metadata.items() if name != "screen"}
+        if (camera, window_size) != (self.screen.camera, self.screen.size):
+            metadata["screen"] = screen_metadata(self.screen.camera, self.screen.size)
+        return replace(self, camera=camera, window_size=window_size, metadata=metadata)
 
 
 class VDISource(SceneAlgorithm):
@@ -249,7 +235,7 @@ class VDISource(SceneAlgorithm):
                 "VDI covers the current view only (coverage='view'); move the camera back and "
                 "regenerate for the whole volume"
             )
-        asked = request.generation.replace(progress=self._advance)
+        asked = request.replace(progress=self._advance)
         if request.target is None:
             return generate_vdi(asked)
         vdi = generate_to_target(asked, request.target)
@@ -302,7 +288,7 @@ class VDISource(SceneAlgorithm):
         """Announce the output's extent: one point per list, as far as it is known before."""
         self.picture_size = self.GetWindowSize() or (1, 1)
         made = self._request
-        announce(outputs, self.picture_size if made is None else made.generating[1])
+        announce(outputs, self.picture_size if made is None else made.window_size)
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
@@ -341,22 +327,20 @@ class VDISource(SceneAlgorithm):
         options = replace(self.GetOptions(), lights=lights)
         # Where lights of the scene shine on it, the volume is lit where it stands now
         placed = self.placed if lights.of_scene else None
-        screen = View(camera, window_size)
-        generating = (camera, window_size)
+        generating, covered = (camera, window_size), True
         if placed is not None:
             generating = (camera.replace(model_transform=placed), window_size)
-        covered = True
         if self.GetCoverage() == "bounds":
             # The corners of the box of points, model frame: tighter than bounds if rotated
             box = bounds_corners([end for n in volume.dimensions for end in (0, n - 1)])
             corners = np.column_stack([box, np.ones(8)]) @ volume.index_to_model.T[:, :3]
             wide = covering_view(*generating, corners)
             covered, generating = wide is not None, wide or generating
-        metadata, device = self.GetMetadata(), self.GetDevice()
+        device, metadata = self.GetDevice(), {"scalars": volume.name, **self.GetMetadata()}
         content = (self._volume_key, table, options, placed, target, device, metadata)
-        metadata = {"scalars": volume.name, **metadata}
-        settings = (options, target, device, metadata, content, covered)
-        return Request(volume, table, screen, generating, *settings)
+        settings = (options, device, None, metadata, View(camera, window_size), target)
+        request = Request(volume, table, camera, window_size, *settings, content, covered)
+        return request.seen_from(*generating)
 
     def _read(self, image: Any) -> Volume:
         """Return the volume; the same object as long as it is the same (it is on the device)."""
