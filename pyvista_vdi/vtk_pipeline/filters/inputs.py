@@ -42,8 +42,6 @@ class Input:
     prop: Any = None
     #: The port of what the bounds depend on; ``None`` where they depend on nothing.
     port: Any = None
-    #: What remedies a view that the VDI does not serve, where there is no source.
-    remedy = "without its volume it cannot be made anew"
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
     period: int | None = None
     #: Whether one step of a series is shown after the other: the event loop has to look at that.
@@ -115,10 +113,6 @@ class Input:
 
         ``None`` where nothing goes on by itself.
         """
-        return None
-
-    def complaint(self, error: BaseException) -> str | None:
-        """Return what is said of an error between two frames; ``None``: what is usual."""
         return None
 
     def parts(self) -> list[tuple[VDI, float]]:
@@ -245,17 +239,6 @@ class SourceInput(Input):
         elif self.of_scene:
             given = given.replace(model_transform=model_transform)
         return View(given, self.source.GetWindowSize() or size)
-
-    def of_view(self, view: View) -> VDI:
-        """Return the VDI of a view and of what there is now, made if it is another one.
-
-        The view of those to come stays.
-        """
-        source, wanted = self.source, self.source.MakeRequest(view)
-        made = source.GetCurrentRequest()
-        if made is None or made.key != wanted.key:
-            source.TakeVDI(source.MakeVDI(wanted), wanted, view=False)
-        return source.GetCurrentVDI()  # type: ignore[return-value]
 
     def exact_request(
         self, view: View, tile: tuple[Camera, tuple[int, int]] | None = None

@@ -103,6 +103,16 @@ class VDISource(SceneAlgorithm):
         "the screen's width and height in pixels, as two numbers or one pair",
         check=checked_size,
     )
+    SetScalars, GetScalars = accessors(
+        "scalars",
+        "the array by its name, ``None`` for the active scalars, and which is preferred where "
+        "points and cells have one of that name: ``'point'``, as by default, or ``'cell'``",
+        (None, "point"),
+        lambda name, preference="point": (
+            name,
+            one_of(preference, "preference", ("point", "cell")),
+        ),
+    )
     SetCoverage, GetCoverage = accessors(
         "coverage",
         "what the VDI covers: its window, ``'view'``, or ``'bounds'``, the smallest rectangle of "
@@ -151,18 +161,6 @@ class VDISource(SceneAlgorithm):
         self.inputs: weakref.WeakSet[Any] = weakref.WeakSet()  # mappers' inputs that draw this
 
     # What is set
-
-    def SetScalars(self, name: str | None, preference: str = "point") -> None:
-        """Choose the array by name; ``None`` means the active scalars.
-
-        ``preference``: which is taken where points and cells have one of that name.
-        """
-        one_of(preference, name="preference", names=("point", "cell"))
-        self._change("scalars", name)
-        self._change("preference", preference, "point")
-
-    _, GetScalars = accessors("scalars", "the array's name, or ``None`` for the active scalars")
-    _, GetPreference = accessors("preference", "whether points or cells come first", "point")
 
     def SetLights(self, lights: LightsLike | None) -> None:
         """Set what a shaded volume is lit by.
@@ -216,13 +214,9 @@ class VDISource(SceneAlgorithm):
         """
         return self._make_request(self.UpdateInput(), view)
 
-    def TakeVDI(self, vdi: VDI, request: Request, *, view: bool = True) -> None:
-        """Take a VDI that was made of a request elsewhere, as if it had been made here.
-
-        ``view``: its view becomes that of the VDIs to come.
-        """
-        if view:
-            self._set |= {"window_size": request.screen.size, "camera": request.screen.camera}
+    def TakeVDI(self, vdi: VDI, request: Request) -> None:
+        """Take a VDI that was made of a request elsewhere; its view is that of those to come."""
+        self._set |= {"window_size": request.screen.size, "camera": request.screen.camera}
         self._vdi, self._request = vdi, request
         self.Modified()  # the output is another
 
@@ -276,13 +270,16 @@ class VDISource(SceneAlgorithm):
         self.GetInputAlgorithm(0, 0).Update()
         return self.GetInputDataObject(0, 0)
 
-    def UpdateFromInput(self) -> VDI:
-        """Return the VDI of the data that are at the input by now.
+    def UpdateFromInput(self, view: View | None = None) -> VDI:
+        """Return the VDI of the data that are at the input by now, or one of another view.
 
         They are those of before where an algorithm further up has failed, which :meth:`GetVDI`
-        raises.
+        raises. The view of the VDIs to come stays.
         """
-        return self._made(self.MakeRequest())
+        vdi = self._made(self.MakeRequest(view))
+        if view is not None:
+            self.Modified()  # the output is another
+        return vdi
 
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the output's extent: one point per list, as far as it is known before."""
@@ -346,7 +343,7 @@ class VDISource(SceneAlgorithm):
         """Return the volume; the same object as long as it is the same (it is on the device)."""
         if image is None:
             raise InvalidVolumeError("what is before VDISource gives no data: check its input")
-        image, chosen = require_image(image), (self.GetScalars(), self.GetPreference())
+        image, chosen = require_image(image), self.GetScalars()
         array = scalars_of(image, *chosen)
         # The image's time is newer than its arrays', whose values may have been written in place
         key = (array.GetAddressAsString(""), image.GetMTime())
