@@ -142,7 +142,7 @@ def generate_anywhere(
             )
         if target:  # which takes many looks at the whole
             view, size = request.camera, request.window_size
-            loaded = request.volume.load_in_view(view, window_size=size)
+            loaded = request.volume.load(view, window_size=size)
             return generate_anywhere(request.replace(volume=loaded), target)
         return registry.generator("blocks")(request, client)  # type: ignore[no-any-return]
     if client is not None:

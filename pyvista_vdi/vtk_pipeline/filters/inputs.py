@@ -240,19 +240,16 @@ class SourceInput(Input):
             given = given.replace(model_transform=model_transform)
         return View(given, self.source.GetWindowSize() or size)
 
-    def exact_request(
-        self, view: View, tile: tuple[Camera, tuple[int, int]] | None = None
-    ) -> Request:
-        """Return what a VDI of exactly a view's picture is made of, or of a tile of it.
+    def exact_request(self, view: View) -> Request:
+        """Return what a VDI of exactly a view's picture is made of.
 
         What covers all of a volume that is near would have larger lists than that has pixels.
         """
         wanted = self.source.MakeRequest(view)
-        camera, size = tile or (view.camera, view.size)
-        lists = wanted.window_size
+        camera, size, lists = view.camera, view.size, wanted.window_size
         extents = zip(wanted.camera.half_extent(lists), camera.half_extent(size), strict=True)
         pixels = math.prod(size) * math.prod(high / low for high, low in extents)
-        if tile is not None or pixels > math.prod(lists) * (1 + ROUNDING):
+        if pixels > math.prod(lists) * (1 + ROUNDING):
             wanted = wanted.seen_from(camera, size)
         return wanted
 
