@@ -28,7 +28,7 @@ from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 
 def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) -> None:
     """Raise TypeError for the first argument whose name is not known, and say what is meant."""
-    known = [name for name in known if name != "self"]
+    known = [name for name in known if name not in ("self", "look")]
     options = declared(*RECORDS)
     for name in given:
         if name in known:
@@ -79,12 +79,8 @@ class Settings(_Fields):  # type: ignore[misc]  # noqa: D101 - made of the optio
     def __init__(self, **given: Any) -> None:
         refuse_unknown(given, "Settings", self.declared)
         super().__init__(**given)
-        object.__setattr__(self, "_said", tuple(given))
-
-    @property
-    def said(self) -> dict[str, Any]:
-        """What was given, defaults among it."""
-        return {name: getattr(self, name) for name in self._said}
+        # What was given, defaults among it
+        object.__setattr__(self, "said", {name: getattr(self, name) for name in given})
 
 
 class Raw:

@@ -135,10 +135,7 @@ class TransferFunction:
     def from_dict(cls, state: dict[str, Any]) -> TransferFunction:
         """Return the transfer function that :meth:`to_dict` described.
 
-        Raises
-        ------
-        InvalidArgumentError
-            If it is no such description, or a value is out of range.
+        InvalidArgumentError if it is no such description, or a value is out of range.
         """
         try:
             arguments = dict(state)

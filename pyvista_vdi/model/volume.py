@@ -204,10 +204,7 @@ class Volume(Grid):
     def load(self, *cameras: Any, window_size: Sequence[int] = (1, 1)) -> Volume:
         """Return the volume in memory, of several levels the one that views require.
 
-        Raises
-        ------
-        DeviceMemoryError
-            If it is read chunk by chunk, and the host has not so much memory free.
+        DeviceMemoryError if it is read chunk by chunk, and the host has not so much memory free.
         """
         found = self.in_view(*cameras, window_size=window_size) if cameras else self
         if not found.chunked:
@@ -225,13 +222,7 @@ class Volume(Grid):
         return self.array[..., 3] if self.rgba else self.array
 
     def finite_range(self) -> tuple[float, float]:
-        """Return the smallest and the largest scalar, NaN left out.
-
-        Raises
-        ------
-        InvalidVolumeError
-            If every value is NaN.
-        """
+        """Return the least and the largest scalar, NaN left out; InvalidVolumeError if all are."""
         low, high = self._range
         if np.isnan(low):
             raise InvalidVolumeError(
