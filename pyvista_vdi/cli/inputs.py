@@ -105,7 +105,7 @@ def open_store(options: argparse.Namespace) -> Any:
     """Open the store that is named, with what is asked of it."""
     asked = {"level": options.level, "channel": options.channel, "time": options.time_index}
     chosen: Any = {name: value for name, value in asked.items() if value is not None}
-    return stores.open_store(options.file, **chosen)
+    return stores.StoredVolume(stores.store_at(options.file), **chosen)
 
 
 def is_volume(options: argparse.Namespace) -> bool:

@@ -130,7 +130,7 @@ class StoredVolume(Volume):
     """
 
     def __init__(
-        self, store: Store, level: int | str, time: int = 0, channel: int | str = 0
+        self, store: Store, level: int | str = "auto", time: int = 0, channel: int | str = 0
     ) -> None:
         count = len(store.levels)
         self.asked = not (isinstance(level, str) and level == "auto")
