@@ -131,7 +131,7 @@ class Camera:
             "an off-axis projection": camera.GetUseOffAxisProjection(),
             "a user transform": camera.GetUserTransform() or camera.GetUserViewTransform(),
         }
-        if has := [name for name, there in lacking.items() if there]:
+        if has := list(filter(lacking.get, lacking)):
             raise UnsupportedError(
                 f"the camera has {' and '.join(has)}, which a VDI cannot honour: remove it"
             )

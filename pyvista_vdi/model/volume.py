@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
 from pyvista_vdi.model.checks import as_floats, as_vector
-from pyvista_vdi.model.chunked import ChunkedArray, held, is_chunked
+from pyvista_vdi.model.chunked import ChunkedArray, held, library_of
 from pyvista_vdi.model.host_memory import require_host_memory
 
 
@@ -122,10 +122,7 @@ class Volume(Grid):
         name: str = "values",
         blanked: NDArray[np.uint8] | None = None,
     ) -> None:
-        if isinstance(array, ChunkedArray):
-            self.array: Any = array
-        else:
-            self.array = ChunkedArray(array) if is_chunked(array) else _checked_array(array)
+        self.array = _checked_array(array)
         self.chunked = isinstance(self.array, ChunkedArray)
         self.rgba = self.array.ndim == 4
         nz, ny, nx = self.array.shape[:3]
@@ -246,7 +243,12 @@ class Volume(Grid):
         return f"Volume({nx} x {ny} x {nz} {kind}, spacing={self.spacing})"
 
 
-def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
+def _checked_array(values: Any) -> Any:
+    """Return an array as a volume holds it: in memory, or read chunk by chunk."""
+    if isinstance(values, ChunkedArray):
+        return values
+    if library_of(values) in ("dask", "zarr", "h5py") and hasattr(values, "chunks"):
+        return ChunkedArray(values)
     try:
         array = np.asarray(values)
     except (TypeError, ValueError) as error:  # lists of different lengths
