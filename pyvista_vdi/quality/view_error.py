@@ -69,7 +69,7 @@ class ViewError:
 class ViewErrorEstimator:
     """Estimates the error of VDIs of one volume; keeps the volume on the device.
 
-    The volume is sampled as ``medium`` and ``changes`` of its options say: as it was when the VDIs
+    The volume is sampled as ``medium`` says: as it was when the VDIs
     were generated, but for the lights, which are those of the view that is judged. An estimate
     takes ``tiles`` of ``tile_size`` pixels along each edge; what SSIM compares around a pixel
     reaches five pixels to each side, so a tile of 24 tells the SSIM of 14 x 14 pixels.
@@ -92,9 +92,8 @@ class ViewErrorEstimator:
         tiles: int = TILES,
         tile_size: int = TILE_SIZE,
         device: Any = None,
-        **changes: Any,
     ) -> None:
-        options = MediumOptions.of(medium, changes)
+        options = medium or MediumOptions()
         self._tiles, self._edge = tiles, tile_size - 2 * REACH
         self._runtime = get_runtime(device)
         edge = max(tile_size, math.isqrt(2 * _COARSE_LAUNCH))  # of what is rendered at a time
