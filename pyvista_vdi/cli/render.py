@@ -87,7 +87,7 @@ def view(options: argparse.Namespace) -> int:
             write_png(np.asarray(picture), target)
             print(f"{printable(options.screenshot)}: written")
             return 0
-        if (player := actor.player) is not None and len(player.series) > 1:
+        if (player := actor.player) is not None and len(player.collection) > 1:
             play, pause = player.play, player.pause
             plotter.add_key_event("space", lambda: pause() if player.playing else play())
         plotter.show()

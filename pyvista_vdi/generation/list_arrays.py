@@ -9,15 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import (
-    DeviceBuffer,
-    GrowingArray,
-    Runtime,
-    aligned_empty,
-    kept_together,
-)
+from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together
 from pyvista_vdi.device.constants import GROUP, LISTS_PER_ITEM
-from pyvista_vdi.model.host_memory import require_host_memory
+from pyvista_vdi.model.host_memory import GrowingArray, aligned_empty, require_host_memory
 from pyvista_vdi.model.packing import Arrays
 
 #: A VDI's arrays of supersegments, as kernels and as messages call them, and an element's shape.
@@ -139,7 +133,8 @@ class GrowingLists:
         bring_to_host(runtime, SUPERSEGMENT_BYTES * self._room)
         with kept_together() as keep:
             sums = keep(runtime.buffer((blocks_to_sum(slice_lists),), np.uint64, "sums of lengths"))
-            offsets = keep(runtime.target(self._offsets, "list offsets"))
+            place = self._offsets
+            offsets = keep(runtime.result(place.shape, np.uint64, "list offsets", out=place))
             runtime.fill(offsets, 0, 1)
             shared = {"partial": GROUP, "sums": sums}
             self._sum_lengths = runtime.bind("generation/offsets.cl", "sum_lengths", **shared)
@@ -228,7 +223,8 @@ class GrowingLists:
         self._begin, self._end = begin, max(end, min(room, begin + self._largest))
         for name, array in self._arrays.items():
             part: NDArray[Any] = array.part(begin, self._end)
-            self._targets[name] = self._runtime.target(part, _ARRAYS[name][0])
+            target = self._runtime.result(part.shape, name=_ARRAYS[name][0], out=part)
+            self._targets[name] = target
 
     def _collect(self, made: int) -> None:
         """Wait until so many supersegments are in the host's arrays; in place, release buffers."""

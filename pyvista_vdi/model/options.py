@@ -360,7 +360,7 @@ class QualityTarget(Options):
         "``full_fps`` and ``max_bytes`` have the scene measured on the device, once. All choose "
         "the VDI's ``window_size``, ``max_supersegments`` and ``precision``, so that these and "
         "``tolerance`` cannot be given as well, and ``window_size`` is that of the pictures. "
-        '``vdi.metadata["dial"]`` or ``actor.status.dial`` says what was chosen: docs/dial.md.',
+        '``vdi.metadata["dial"]`` says what was chosen: docs/dial.md.',
     )
     target_ssim: float | None = option(
         None,

@@ -193,9 +193,7 @@ def _kept(seen: Seen) -> Plan:
         return _planned(seen, "trouble")
     if seen.joint and seen.regenerate == "auto":
         own = made is not None and not seen.stale and made.screen == seen.view
-        if own and made.coverage == 1 and made.magnification <= FINE_ENOUGH:  # type: ignore[union-attr]
-            return _planned(seen, "vdi")
-        return _planned(seen, "exact", follow=follow)
+        return _planned(seen, "vdi" if own else "exact", follow=follow)
     if seen.joint or seen.volume == "none":
         return _planned(seen, "vdi", follow=follow, update=again)
     return _planned(seen, "volume", seen.content, follow=follow, in_bricks=True)

@@ -27,9 +27,7 @@ def render_vdi(vdi: VDI, request: FrameRequest) -> NDArray[np.float32]:
     runtime = get_runtime(request.device)
     prepared = prepared_vdi(runtime, vdi)
     shape, out = (*request.size[::-1], 4), request.out
-    with (
-        runtime.result(shape, name="image") if out is None else runtime.target(out, "image")
-    ) as image:
+    with runtime.result(shape, name="image", out=out) as image:
         draw(prepared, request, image)
         return runtime.download(image, out)
 

@@ -17,6 +17,7 @@ from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkOpenGLShaderProperty,
     vtkVolume,
+    weakly,
 )
 
 
@@ -43,11 +44,16 @@ class VDIActorMethods:
                 f"a VDIActor needs a VDIMapper; got {type(mapper).__name__}: an ordinary volume "
                 "mapper goes behind a vtkVolume"
             )
-        if mapper is not None:
-            mapper.driver.set_actor(self)
+        if mapper is not None and mapper.driver.actor() not in (None, self):
+            raise InvalidArgumentError(
+                "this VDIMapper is already behind another VDIActor: give each actor its own "
+                "(the VDI itself can be shared)"
+            )
         old = self.GetMapper()
-        if isinstance(old, VDIMapperMethods) and old is not mapper:
-            old.driver.leave_actor(self)
+        if isinstance(old, VDIMapperMethods) and old.driver.actor() is self:
+            old.driver.actor = lambda: None
+        if mapper is not None:
+            mapper.driver.actor = weakly(self)
         super().SetMapper(mapper)  # type: ignore[misc]
         # VTK keeps no more than its own part of a mapper, so this observer, which is never called,
         # keeps the rest. The shader property is what VTK frees last of an actor: so the mapper goes
@@ -244,10 +250,13 @@ class VDIActorMethods:
                 "this actor shows VDIs without a volume, which cannot be generated anew: add "
                 "the volume, or set another VDI (actor.vdi = another)"
             )
-        mapper.driver.retry()
+        driver = mapper.driver
+        driver.drop()
+        driver.failed = ()
+        driver.warnings.said.clear()
         matrix = as_array(self.GetMatrix())
-        renderer, shown = mapper.driver.renderer(), mapper.driver.input
-        shown.note_scene(mapper.driver.renderers, matrix)
+        renderer, shown = driver.renderer(), driver.input
+        shown.note_scene(driver.renderers, matrix)
         if camera is not None:
             source.SetCamera(camera, matrix)
         elif renderer is not None:

@@ -39,25 +39,20 @@ def _on_end(mapper: Any, event: str) -> None:
 class VDIMapperMethods:
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
-    _driver: Driver | None = None
+    #: What draws; made with the mapper, before which PyVista's constructor sets some settings.
+    driver: Any = None
 
     def _become_vdi_mapper(self: Any) -> None:
         """Install proxy and observers; to be called once, from ``__init__``."""
-        self._driver = Driver()
+        self.driver: Driver = Driver()
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)
         super().SetScalarModeToUsePointData()  # type: ignore[misc]
-        super().SetInputConnection(self._driver.box.GetOutputPort())  # type: ignore[misc]
+        super().SetInputConnection(self.driver.box.GetOutputPort())  # type: ignore[misc]
         # Plain functions: they get the mapper from VTK and hold nothing
         self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
         self.AddObserver("VolumeMapperRenderEndEvent", _on_end)
-
-    @property
-    def driver(self) -> Driver:
-        """What draws; made with the mapper."""
-        assert self._driver is not None
-        return self._driver
 
     def own_source(self, what: str) -> VDISource:
         """Return the source.
@@ -132,17 +127,6 @@ class VDIMapperMethods:
     def GetDevice(self) -> Any:
         """Return the device as it was set."""
         return self.driver.device
-
-    # In VTK's GPU mapper SetAutoAdjustSampleDistances would draw VTK's own volume into a smaller
-    # framebuffer, so its own switch stays off, and what is called from Python keeps ours.
-
-    def AutoAdjustSampleDistancesOn(self: Any) -> None:
-        """Draw previews."""
-        self.SetAutoAdjustSampleDistances(True)
-
-    def AutoAdjustSampleDistancesOff(self: Any) -> None:
-        """Draw every frame in full."""
-        self.SetAutoAdjustSampleDistances(False)
 
     def ShallowCopy(self: Any, other: Any) -> None:
         """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.

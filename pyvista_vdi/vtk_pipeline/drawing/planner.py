@@ -28,15 +28,15 @@ from pyvista_vdi.quality.view_error import (
     angle_from_generating_view,
     magnification,
 )
-from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Matrix, consumers, planes_of
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, consumers, planes_of
 from pyvista_vdi.vtk_pipeline.drawing.images import VolumePicture
 from pyvista_vdi.vtk_pipeline.drawing.overlap import group_of
 from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
-from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, renderer_view, size_of
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import Warnings
-from pyvista_vdi.vtk_pipeline.interaction.window import Window, now
+from pyvista_vdi.vtk_pipeline.interaction.window import now
 
 _log = logging.getLogger(__name__)
 
@@ -80,7 +80,6 @@ class Planner:
         self._refused: tuple[Any, Any] | None = None  # a content that the device cannot draw
         self._stamp: Any = None  # of all that the last frame depended on
         self._moved_at, self._number = -math.inf, (0, 0)  # and of what frame of which window
-        self._pixels = 0.0  # of the last frame, in which the volume may be seen
 
     def drop(self) -> None:
         """Cancel what is being made in the background."""
@@ -203,11 +202,12 @@ class Planner:
         self._stamp = stamp
         vdi, made_of = source.last(), source.source.GetCurrentRequest()
         known = vdi is not None and made_of is not None
-        content, volume, self._pixels = None, "whole", 0.0
+        content, volume, late, each = None, "whole", False, self.costs.volume
         if wanted is not None:
             content = wanted.content
-            if watched:
-                self._pixels = frame.covered_by(wanted.volume.bounds)
+            if watched and each is not None and settings.target_fps != 0:
+                seconds = each * frame.covered_by(wanted.volume.bounds) + self.costs.fixed
+                late = window.pace.late(seconds, window.rate(settings))
             if self._refused is not None and content == self._refused[0]:
                 volume = self._refused[1]
         previews = window.previews(settings)
@@ -228,7 +228,7 @@ class Planner:
             first_look=first,
             made=self._as_made(vdi, frame, made_of) if known else None,  # type: ignore[arg-type]
             volume=volume,  # type: ignore[arg-type]
-            late=watched and self._late(window),
+            late=late,
             seconds=1 / (window.pace.headroom * window.rate(settings)) if previews else None,
             **self._going_on(),
         )
@@ -249,20 +249,13 @@ class Planner:
         of = (weakref.ref(vdi), vdi.bounds, content, screen, angle, detail, covered)
         return Made(*of, frame.covered_by(vdi.bounds))
 
-    def _late(self, window: Window) -> bool:
-        """Whether the volume's own full frames of the last view miss the rate."""
-        each, settings = self.costs.volume, self.settings
-        if each is None or settings.target_fps == 0:
-            return False
-        return window.pace.late(each * self._pixels, window.rate(settings))
-
     # What is planned is done
 
-    def _do(self, planned: Plan, seen: Seen, source: SourceInput, frame: Frame | None) -> None:
+    def _do(self, planned: Plan, seen: Seen, source: SourceInput, frame: Frame) -> None:
         """Begin, or give up, what goes on in the background, and make what a frame waits for."""
         if planned.give_up:
             self.drop()
-        if planned.follow and frame is not None:
+        if planned.follow:
             source.follow_if_changed(*frame.seen_from)
         if planned.make is not None:
             try:
@@ -276,7 +269,7 @@ class Planner:
                 self.worker.put(vdi_job(request.generation, request.target))
         if planned.estimate:
             self._estimate(source, seen.view)
-        if planned.update and frame is not None:
+        if planned.update:
             self._update(source)
 
     def _estimate(self, source: SourceInput, view: View) -> None:
@@ -323,13 +316,10 @@ class Planner:
         return self._volume
 
     def _of_this_view(self, source: SourceInput, frame: Frame) -> VDI:
-        """Make and return a VDI of exactly the frame's view, kept unless the frame is a tile."""
-        whole = frame.full_size == frame.view.size
-        tile = None if whole else (frame.camera, frame.size)
-        wanted = source.exact_request(frame.view, tile)
+        """Make and return a VDI of exactly the frame's view."""
+        wanted = source.exact_request(frame.view)
         vdi = source.source.MakeVDI(wanted)
-        if whole:
-            source.source.TakeVDI(vdi, wanted)
+        source.source.TakeVDI(vdi, wanted)
         return vdi
 
     def _update(self, source: Input) -> None:
@@ -360,7 +350,7 @@ class Planner:
     # Between frames
 
     def advance(self) -> bool:
-        """Take what was made in the background; whether there is another VDI to be drawn."""
+        """Take what was made in the background; whether a frame has something new to look at."""
         try:
             another = None if self.input is None else self.input.advance()
         except Exception as error:
@@ -378,7 +368,7 @@ class Planner:
         (request, self._asked), self.making = (self._asked, None), None
         if isinstance(made, ViewEstimate):
             self.estimate = made
-            return False
+            return True
         assert isinstance(self.input, SourceInput)
         self.input.source.TakeVDI(made, request)
         self.estimate = None
@@ -386,28 +376,16 @@ class Planner:
             self._volume = None
         return True
 
-    def begin_at_rest(self, window: Window) -> None:
-        """Begin what a view at rest is missing, though no frame asks."""
-        source, seen = self.input, self.seen
-        if not isinstance(source, SourceInput) or seen is None or source.stamp() != self._stamp:
-            return  # what has changed is for a frame to look at
-        still, moving = now() - self._moved_at >= SETTLED, window.moving
-        self.seen = seen = replace(
-            seen,
-            hand=moving and not still,
-            settled=still and not moving,
-            first_look=False,
-            late=self._late(window),
-            **self._going_on(),
-        )
-        self._do(plan(seen), seen, source, None)
+    @property
+    def unsettled(self) -> bool:
+        """Whether what the view is missing at rest is still to be begun, by another frame."""
+        return self.seen is not None and not self.seen.settled
 
     @property
     def goes_on(self) -> bool:
         """Whether something goes on that the event loop has to look at."""
-        if self._asked is not None or (self.input is not None and self.input.playing):
-            return True
-        return self.seen is not None and now() - self._moved_at < SETTLED
+        playing = self.input is not None and self.input.playing
+        return self._asked is not None or playing or self.unsettled
 
     # What is asked for between frames
 
@@ -432,21 +410,6 @@ class Planner:
         elif seen is not None:
             return source.of_view(source.view_for(*seen))
         return source.last()
-
-    def vdi_of_view(self, renderer: Any, matrix: Matrix) -> VDI | None:
-        """Return a VDI of exactly what a renderer shows of an actor of that matrix, (4, 4).
-
-        It is made beside the one that is there; without the volume, or where nobody but
-        ``actor.regenerate()`` may make another, it is that one.
-        """
-        source = self.input
-        if not isinstance(source, SourceInput) or self.settings.regenerate == "never":
-            return self.vdi_asked_for()
-        source.note_scene(self.renderers, matrix)
-        wanted = source.exact_request(renderer_view(renderer, matrix))
-        made = source.source.GetCurrentRequest()
-        same = made is not None and made.key == wanted.key
-        return source.last() if same else source.source.MakeVDI(wanted)
 
     def vdi_to_pick(self, frame: Frame) -> VDI | None:
         """Return a VDI that has all of what a view shows; without a volume, the one there is."""

@@ -97,8 +97,7 @@ def with_settings(cls: _Class) -> _Class:
 
 def _pair(told: Option) -> tuple[Callable[..., None], Callable[..., Any]]:
     def setter(self: Any, value: Any) -> None:
-        value, driver = told.check(value) if told.check else value, self._driver
-        # PyVista's constructor sets some before there is a driver
+        value, driver = told.check(value) if told.check else value, self.driver
         if driver is not None and getattr(driver.settings, told.name) != value:
             driver.settings = replace(driver.settings, **{told.name: value})
             self.Modified()

@@ -258,19 +258,17 @@ class SourceInput(Input):
             source.TakeVDI(source.MakeVDI(wanted), wanted, view=False)
         return source.GetCurrentVDI()  # type: ignore[return-value]
 
-    def exact_request(
-        self, view: View, tile: tuple[Camera, tuple[int, int]] | None = None
-    ) -> Request:
-        """Return what a VDI of exactly a view's picture is made of, or of a tile of it.
+    def exact_request(self, view: View) -> Request:
+        """Return what a VDI of exactly a view's picture is made of.
 
         What covers all of a volume that is near would have larger lists than that has pixels.
         """
         wanted = self.source.MakeRequest(view)
-        camera, size = tile or (view.camera, view.size)
+        camera, size = view.camera, view.size
         generating, lists = wanted.generating
         extents = zip(generating.half_extent(lists), camera.half_extent(size), strict=True)
         pixels = math.prod(size) * math.prod(high / low for high, low in extents)
-        if tile is not None or pixels > math.prod(lists) * (1 + ROUNDING):
+        if pixels > math.prod(lists) * (1 + ROUNDING):
             wanted = replace(wanted, generating=(camera, size))
         return wanted
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from pyvista_vdi.errors import VDIWarning, warn_external
 from pyvista_vdi.model.vdi import VDI
@@ -73,14 +73,6 @@ class VDIStatus:
     def share(self) -> float:
         """Share of the viewport's pixels that a ray was cast for, 0 to 1."""
         return self.samples / self.full_samples if self.full_samples else 0.0
-
-    @property
-    def dial(self) -> dict[str, Any] | None:
-        """What a dial chose for the VDI, and what it predicts; ``None`` where there is none.
-
-        See ``vdi.metadata["dial"]`` in docs/dial.md.
-        """
-        return None if self.vdi is None else self.vdi.metadata.get("dial")
 
     def __str__(self) -> str:
         if self.mode == "none":
