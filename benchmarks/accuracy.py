@@ -17,9 +17,9 @@ from shared import Case, Results, benches, execute, mean_of, parser_of, table  #
 
 from pyvista_vdi import generate
 from pyvista_vdi.measure.bench import accuracy
-from pyvista_vdi.model.options import QUALITIES, QualityTarget
+from pyvista_vdi.model.options import QUALITIES
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
-from pyvista_vdi.quality.targets import turned
+from pyvista_vdi.quality.targets import TARGET_ANGLE, turned
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 
@@ -48,9 +48,6 @@ SETTINGS: Mapping[str, Mapping[str, Any]] = {
 
 #: Volumes for which one transfer function has to do, because of their size.
 SOFT_ONLY = ("allen_mouse_brain",)
-
-#: Degrees from V_O for which targets are meant.
-_ANGLE = QualityTarget().target_angle
 
 #: Qualities that state an SSIM.
 PRESETS = tuple(name for name, goal in QUALITIES.items() if goal is not None)
@@ -136,7 +133,7 @@ def of_preset(bench: Any, quality: str) -> dict[str, Any]:
         target_ssim=QUALITIES[quality],
         device=bench.runtime,
     )
-    view = turned(bench.view, bench.volume.bounds, _ANGLE)
+    view = turned(bench.view, bench.volume.bounds, TARGET_ANGLE)
     near = accuracy(bench.draw(vdi, view), bench.reference(view))
     dial = vdi.metadata["dial"]
     truth = {
@@ -184,7 +181,7 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     yield from table(
         ("view", "true SSIM", "error, mean", "without sign", "worst"), errors(measured)
     )
-    yield from ("", f"Presets at {_ANGLE:g} degrees, predicted less the truth:", "")
+    yield from ("", f"Presets at {TARGET_ANGLE:g} degrees, predicted less the truth:", "")
     rows = []
     for quality in PRESETS:
         found = [row for row in measured if row["case"]["what"] == f"quality {quality}"]

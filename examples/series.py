@@ -52,14 +52,14 @@ def main() -> None:
     actor = plotter.add_vdi(series, show_scalar_bar=False)
     plotter.camera_position = (camera.position, camera.focal_point, camera.view_up)
     if not off_screen:
-        ends = series.times[0], series.times[-1]
-        plotter.add_slider_widget(lambda time: setattr(actor, "time", time), ends, title="time")
-        actor.play(rate=10)
+        player, ends = actor.player, (series.times[0], series.times[-1])
+        plotter.add_slider_widget(lambda time: setattr(player, "time", time), ends, title="time")
+        player.play(rate=10)
         plotter.show()
         return
     plotter.open_gif(str(target), fps=10)
     for time in series.times:
-        actor.time = time
+        actor.player.time = time
         plotter.camera.Azimuth(1)
         plotter.write_frame()
     plotter.close()

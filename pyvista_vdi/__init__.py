@@ -67,7 +67,6 @@ registry.core = registry.Extension(
             "pyvista_vdi.vtk_pipeline:transfer_function_from_property"
         ),
         "VDI.from_image": "pyvista_vdi.vtk_pipeline:vdi_from_image",
-        "VDI.plot": "pyvista_vdi.plotting.accessor:plot",
         "VDI.save": "pyvista_vdi.io:write",
         "Volume.read": "pyvista_vdi.io.volumes:read_volume",
         "Volume.from_vtk": "pyvista_vdi.vtk_pipeline:volume_from_vtk",

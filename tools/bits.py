@@ -221,7 +221,7 @@ def generation_cases() -> Cases:
     yield from both("occlusion/strong", noise, {**shiny, **graded}, ambient_occlusion=strong)
     yield from both("occlusion/rgba", partial(noise, "rgba"), ambient_occlusion=True)
     # What a memory limit has brought to the device brick by brick
-    shape, tight = (60, 90, 80), {"memory_limit": "2600 kB", "size": (24, 20)}
+    shape, tight = (60, 90, 80), {"memory_limit": 2_600_000, "size": (24, 20)}
     for dtype in ("float32", "float64"):
         yield from both(f"bricks/{dtype}", partial(noise, dtype, shape), **tight)
     yield from both("bricks/lit", partial(noise, "float32", shape), {**matt, **graded}, **tight)

@@ -11,8 +11,8 @@ from pyvista_vdi.model.deferred import (DeferredVDI)
 from pyvista_vdi.model.transfer_function import (TransferFunction)
 from pyvista_vdi.model.types import (
     CameraLike, ClientLike, ColorMapLike, Coverage, Criterion, CroppingLike, DeviceLike,
-    Interpolation, LightsLike, MemoryLike, OcclusionLike, OpacityLike, Precision, Preference,
-    Progress, Quality, RangeLike, ScalarsLike, ShownLike, VTKObject, VolumeLike, WindowSize,
+    Interpolation, LightsLike, OcclusionLike, OpacityLike, Precision, Preference, Progress, Quality,
+    RangeLike, ScalarsLike, ShownLike, VTKObject, VolumeLike, WindowSize,
 )
 from pyvista_vdi.model.vdi import (VDI)
 from pyvista_vdi.raycasting.picking import (Pick)
@@ -29,10 +29,10 @@ def generate(
     'nearest', volume_property: VTKObject | None = None, transfer_function: TransferFunction | None
     = None, classification: Literal['baked'] = 'baked', value_range: RangeLike | None = None,
     quality: Quality | None = None, target_ssim: float | None = None, full_fps: float | None = None,
-    max_bytes: float | None = None, lights: LightsLike | None = None, ambient_occlusion:
-    OcclusionLike | None = None, max_supersegments: int = 20, precision: Precision = 'exact',
-    settings: Settings | None = None, client: ClientLike | None = None, device: DeviceLike | None =
-    None, progress: Progress | None = None,
+    max_bytes: int | None = None, lights: LightsLike | None = None, ambient_occlusion: OcclusionLike
+    | None = None, max_supersegments: int = 20, precision: Precision = 'exact', settings: Settings |
+    None = None, client: ClientLike | None = None, device: DeviceLike | None = None, progress:
+    Progress | None = None,
 ) -> VDI: ...
 @overload
 def generate(
@@ -45,10 +45,10 @@ def generate(
     'nearest', volume_property: VTKObject | None = None, transfer_function: TransferFunction | None
     = None, classification: Literal['deferred'], value_range: RangeLike | None = None, quality:
     Quality | None = None, target_ssim: float | None = None, full_fps: float | None = None,
-    max_bytes: float | None = None, lights: LightsLike | None = None, ambient_occlusion:
-    OcclusionLike | None = None, max_supersegments: int = 20, precision: Precision = 'exact',
-    settings: Settings | None = None, client: ClientLike | None = None, device: DeviceLike | None =
-    None, progress: Progress | None = None,
+    max_bytes: int | None = None, lights: LightsLike | None = None, ambient_occlusion: OcclusionLike
+    | None = None, max_supersegments: int = 20, precision: Precision = 'exact', settings: Settings |
+    None = None, client: ClientLike | None = None, device: DeviceLike | None = None, progress:
+    Progress | None = None,
 ) -> DeferredVDI: ...
 def pick(
     vdi: ShownLike, camera: CameraLike, pixel: Sequence[float], window_size: WindowSize | None =
@@ -86,18 +86,16 @@ def render_volume(
 class Settings:
     given: dict[str, Any]
     sample_distance: float | None
-    memory_limit: MemoryLike | None
+    memory_limit: int | None
     criterion: Criterion
     tolerance: float
     view_cone: float
-    target_angle: float
     transmittance_cutoff: float
-    adjust_multi_samples: bool
     regenerate_below: float | None
     coverage: Coverage
     def __init__(
-        self, *, sample_distance: float | None = None, memory_limit: MemoryLike | None = None,
-        criterion: Criterion = 'least-error', tolerance: float = 0.0, view_cone: float = 60.0,
-        target_angle: float = 30.0, transmittance_cutoff: float = 1e-06, adjust_multi_samples: bool
-        = True, regenerate_below: float | None = None, coverage: Coverage = 'bounds',
+        self, *, sample_distance: float | None = None, memory_limit: int | None = None, criterion:
+        Criterion = 'least-error', tolerance: float = 0.0, view_cone: float = 60.0,
+        transmittance_cutoff: float = 1e-06, regenerate_below: float | None = None, coverage:
+        Coverage = 'bounds',
     ) -> None: ...

@@ -110,7 +110,7 @@ def render(
         refuse_unknown(look, "render", _names(render))
     if isinstance(vdi, list | tuple) or model_transforms is not None:
         alone = {name: options.pop(name) for name in ("preview_samples", "transmittance_cutoff")}
-        for name in RenderOptions.checked(**alone).given:
+        for name in RenderOptions(**alone).given:
             raise InvalidArgumentError(f"{name} is for a single VDI: leave it out for several")
         from pyvista_vdi.raycasting.multi_vdi import common_window_size, placed_vdis, render_vdis
 

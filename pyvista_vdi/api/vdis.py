@@ -16,7 +16,6 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.levels import nearest_depth
 from pyvista_vdi.model.options import (
     Deferral,
     GenerationOptions,
@@ -34,6 +33,7 @@ from pyvista_vdi.model.types import (
     WindowSize,
 )
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.view import nearest_depth
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 
 
@@ -115,7 +115,7 @@ def generate(
     if deferral.deferred:
         look.require_no_look()
         deferral.refuse_target(target)
-    from pyvista_vdi.generation.deferred import generate_deferred, unclassified, warn_of_range
+    from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 
     request = GenerationRequest(
         volume=read,
@@ -136,7 +136,6 @@ def generate(
     vdi: Any
     if deferral.deferred:
         vdi = generate_deferred(request, deferral, lambda it: generate_anywhere(it, target, client))
-        warn_of_range(vdi, read)
     else:
         vdi = generate_anywhere(request, target, client)
     warn_missed(vdi)

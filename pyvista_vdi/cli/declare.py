@@ -14,7 +14,6 @@ from collections.abc import Callable
 from typing import Any
 
 from pyvista_vdi.model.camera import check_window_size
-from pyvista_vdi.model.checks import memory_limit_bytes
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget, declared
 from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
@@ -50,11 +49,6 @@ def size(text: str) -> tuple[int, int]:
     return check_window_size((width, height))
 
 
-def size_in_bytes(text: str) -> int | None:
-    """Return bytes from ``2GiB``."""
-    return memory_limit_bytes(text)
-
-
 def level(text: str) -> int | str:
     """Return ``auto``, or a level's number."""
     return text if text == "auto" else int(_numbers_as("level", int, 0)(text))
@@ -80,7 +74,6 @@ _READERS: dict[str, Callable[[str], Any]] = {
     "RATE": _numbers_as("rate", float, 0),
     "PORT": _numbers_as("port", int, 0, 65535),
     "WxH": size,
-    "SIZE": size_in_bytes,
     "A,B,...": numbers,
     "COLOR": color,
     "auto|N": level,
@@ -93,7 +86,6 @@ _CALLED = {
     "OcclusionLike": "-",
     "int": "N",
     "float": "X",
-    "MemoryLike": "SIZE",
     "RangeLike": "LOW HIGH",
     "ArrayLike": "A,B,...",
     "OpacityLike": "NAME|A,B,...",
@@ -119,9 +111,9 @@ azimuth=0           DEGREES   turn by
 elevation=0         DEGREES   lift by
 tf                  {tf}      a standard transfer function; --cmap and --opacity change its parts
 transfer_function   FILE      TransferFunction.to_dict() as JSON; needs no PyVista
-memory_limit        SIZE      of the device, like 2GiB; what does not fit goes there in bricks
+memory_limit        N         bytes of the device; what does not fit goes there in bricks
 criterion           NAME      where a list is cut: least-error (default) or homogeneity
-max_bytes           SIZE      most bytes of the VDI on the device, like 20MB
+max_bytes           N         most bytes of the VDI on the device
 compression         {lz4,zstd,deflate,none}  of .vdi, by default lz4; .html has deflate
 compression_level   N         1 (fast) to 9 (small)
 time                T         of a series, the step nearest in time (default: the first)

@@ -63,7 +63,7 @@ def _of_volume(volume: Any) -> dict[str, Any]:
             "store": store.kind,
             "axes": dict(zip(store.axes, store.levels[0].array.shape, strict=True)),
             "channels": store.channels,
-            "chunks": volume.chunks.chunks[::-1] if volume.chunks else (),
+            "chunks": volume.array.chunks[::-1] if volume.chunked else (),
         }
         for k, level in enumerate(store.levels):
             about[f"level {k}"] = {"points": level.grid.dimensions, "spacing": level.grid.spacing}

@@ -23,7 +23,7 @@ from pyvista_vdi.cli.inputs import (
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
 from pyvista_vdi.io import check_writable, to_bytes, write_png
-from pyvista_vdi.model.collection import RATE, VDICollection
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import picture_view
@@ -76,22 +76,20 @@ def view(options: argparse.Namespace) -> int:
         aim(plotter.camera, first)
         plotter.renderer.reset_camera_clipping_range()
         if options.time is not None:
-            actor.time = options.time
+            actor.player.time = options.time
         if target is not None:
             with warnings.catch_warnings():
                 # The error itself is raised below; no file is written then
                 warnings.filterwarnings("ignore", "the VDI cannot be drawn", VDIWarning)
                 picture = plotter.screenshot(return_img=True)
-            actor.mapper.driver.raise_trouble()
+            if (trouble := actor.mapper.driver.trouble) is not None:
+                raise trouble
             write_png(np.asarray(picture), target)
             print(f"{printable(options.screenshot)}: written")
             return 0
-        if actor.series is not None and len(actor.series) > 1:
-
-            def toggle() -> None:
-                actor.pause() if actor.playing else actor.play(RATE)
-
-            plotter.add_key_event("space", toggle)
+        if (player := actor.player) is not None and len(player.collection) > 1:
+            play, pause = player.play, player.pause
+            plotter.add_key_event("space", lambda: pause() if player.playing else play())
         plotter.show()
     finally:
         plotter.close()

@@ -13,7 +13,7 @@ table: ambient_occlusion deferral:
 [limits]
 max_supersegments criterion sample_distance tolerance view_cone memory_limit
 [quality] Lists and precision are chosen by a measurement; --size is that of pictures.
-quality target_ssim full_fps max_bytes target_angle
+quality target_ssim full_fps max_bytes
 [file]
 compression compression_level
 precision  {exact,8-byte}  of .vdi, by default exact, and of .html 8-byte

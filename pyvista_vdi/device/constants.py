@@ -38,8 +38,7 @@ SLABS = 64
 PLANE_FORMS = 7
 #: Pixels across by pixels along a packet, at most: that of the line that it follows.
 STEEPEST = 1.5
-#: float32 numbers of a segment of a ray, and slots that a ray has to spare where segments lie in
-#: rows (``multi_vdi/pool.cl``).
+#: float32 numbers of a segment of a ray, and slots that a ray has to spare (``multi_vdi/pool.cl``).
 SEGMENT_SIZE, SPARE_SLOTS = 6, 2
 
 

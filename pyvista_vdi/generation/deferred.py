@@ -1,13 +1,12 @@
 """Volume to a VDI that keeps values, by the same marches: a transfer function that keeps them."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, warn_external
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.checks import as_range
 from pyvista_vdi.model.deferred import DeferredVDI
@@ -18,7 +17,7 @@ from pyvista_vdi.model.options import (
     record,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import lengths_of, with_arrays
+from pyvista_vdi.model.vdi import lengths_of, made_vdi
 from pyvista_vdi.model.volume import Volume
 
 #: Optical depth of a voxel's length of what is kept: so little that float32 sums it up as a length,
@@ -35,9 +34,6 @@ _LOW_END = 2.0**-4
 #: Spreads below what float32 holds of a mean of squares are none; shares this near to 1 are 1.
 _LEAST_SPREAD = 5e-4
 _WHOLE = 1e-3
-#: Points that are looked at of a volume; how many times as wide as their values a range may be.
-#: And the share of the least, and of the largest, that are left out.
-_SAMPLED, _NARROW, _FEW = 2**16, 20, 1e-4
 #: Supersegments that are converted at a time.
 _PIECE = 2**16
 
@@ -101,10 +97,8 @@ def generate_deferred(
     metadata: dict[str, Any] = dict(made.metadata)
     for name in ("transfer_function", "opacity_unit_distance", "view_cone"):
         metadata.pop(name)
-    if volume.chunks is None:  # else all would be read for it
-        metadata["volume"] = {**metadata["volume"], "scalar_range": list(volume.finite_range())}
     arrays = made.arrays._replace(color=color, optical_depth=spread)
-    lists = with_arrays(made, arrays, metadata=metadata)
+    lists = made_vdi(arrays, made, metadata=metadata)
     about = {
         "version": 1,
         "value_range": (low, high),
@@ -143,33 +137,6 @@ def kept_range(
             )
         )
     return low, high
-
-
-def warn_of_range(kept: DeferredVDI, volume: Volume) -> None:
-    """Warn where a VDI's range of values holds none of a volume's, or all in a small part of it."""
-    if volume.chunks is not None:  # nothing is read for it
-        return
-    low, high = kept.value_range
-    if not kept.n_supersegments:
-        least, largest = volume.finite_range()
-        warn_external(
-            f"this VDI is empty: there is nothing from {low:g} to {high:g} in view; the values of "
-            f"the volume go from {least:g} to {largest:g}"
-        )
-        return
-    step = math.ceil((volume.array.size / _SAMPLED) ** (1 / 3))
-    values = volume.array[::step, ::step, ::step].astype(np.float64)
-    values = values[(values >= low) & (values <= high)]
-    if not values.size:
-        return
-    least = np.quantile(values, _FEW, method="higher")
-    largest = np.quantile(values, 1 - _FEW, method="lower")
-    if 0 < _NARROW * (largest - least) < high - low:
-        warn_external(
-            f"nearly all values lie from {least:g} to {largest:g}, a small part of the "
-            f"range from {low:g} to {high:g}, of which a deferred VDI keeps shares: give a "
-            "value_range that is not much wider than what is to be seen"
-        )
 
 
 def _keeping(request: GenerationRequest, value_range: tuple[float, float]) -> TransferFunction:

@@ -117,9 +117,10 @@ class GrowingLists:
     ) -> None:
         self._runtime, self._size, self._limit = runtime, size, limit
         self._most = size[0] * size[1] * limit  # supersegments
-        self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
         self._made = 0  # lists, those of the last slice included
         self._known = 0  # supersegments of all lists whose sum is known here
+        self._require_room()
+        self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
         self._begin = self._end = 0  # supersegments that the buffers hold
         self._wait: Callable[[], None] | None = None  # for the sum with the last slice
         self._sum = np.zeros(1, np.uint64)
@@ -177,9 +178,18 @@ class GrowingLists:
         self._wait()
         self._wait = None
         begin, self._known = self._known, int(self._sum[0])
-        require_room(self._known, self._size)
+        self._require_room()
         if self._known > self._end:
             self._make_room(begin, self._known)
+
+    def _require_room(self) -> None:
+        """Refuse to go on where the host cannot hold what is known of the VDI."""
+        width, height = self._size
+        require_host_memory(
+            self._known * SUPERSEGMENT_BYTES + 8 * width * height,
+            f"a VDI of {width} x {height} lists",
+            "lower the window size or max_supersegments, or raise tolerance",
+        )
 
     def finished(self) -> Arrays:
         """Return the arrays, on the host."""
@@ -235,12 +245,3 @@ class GrowingLists:
 def blocks_to_sum(lists: int) -> int:
     """Return the work-groups that sum up the lengths of so many lists."""
     return -(-lists // (GROUP * LISTS_PER_ITEM))
-
-
-def require_room(supersegments: int, size: tuple[int, int]) -> None:
-    """Refuse to go on where the host cannot hold a VDI of at least so many supersegments."""
-    require_host_memory(
-        supersegments * SUPERSEGMENT_BYTES + 8 * size[0] * size[1],
-        f"a VDI of {size[0]} x {size[1]} lists",
-        "lower the window size or max_supersegments, or raise tolerance",
-    )

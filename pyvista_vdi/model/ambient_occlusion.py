@@ -7,7 +7,7 @@ such as ambient occlusion" (section 2). Computed is docs/dev/conventions.md, "Am
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import Number
-from pyvista_vdi.model.volume import Geometry
-
-#: Radius by default, as a share of the bounds' diagonal.
-DEFAULT_RADIUS = 0.05
+from pyvista_vdi.model.volume import Grid
 
 #: Steps that a radius is cut into at least.
 _LEAST_STEPS = 8
@@ -27,20 +24,9 @@ _LEAST_CELLS = 32
 
 
 _CHECKS = {
-    "radius": Number(
-        "a positive length in model units",
-        open_ended=True,
-        name="the radius of ambient occlusion",
-        none=True,
-    ),
-    "strength": Number("from 0 to 1", 0, 1, name="the strength of ambient occlusion"),
-    "directions": Number(
-        "a whole number from 12 to 4096",
-        12,
-        4096,
-        whole=True,
-        name="the directions of ambient occlusion",
-    ),
+    "radius": Number("a positive length in model units", open_ended=True, none=True),
+    "strength": Number("from 0 to 1", 0, 1),
+    "directions": Number("a whole number from 12 to 4096", 12, 4096, whole=True),
 }
 
 
@@ -78,9 +64,9 @@ class AmbientOcclusion:
     directions: int = 32
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
         for name, check in _CHECKS.items():
-            put(self, name, check(getattr(self, name)))
+            named = replace(check, name=f"the {name} of ambient occlusion")
+            object.__setattr__(self, name, named(getattr(self, name)))
 
     @classmethod
     def from_any(cls, value: Any) -> AmbientOcclusion | None:
@@ -91,10 +77,8 @@ class AmbientOcclusion:
         """
         if value is None or value is False:
             return None
-        if value is True:
-            return cls()
         if isinstance(value, int | float | np.number):
-            return cls(value)  # type: ignore[arg-type]
+            return cls() if value is True else cls(value)  # type: ignore[arg-type]
         if isinstance(value, cls):
             return value if value.strength > 0 else None
         raise InvalidArgumentError(
@@ -102,12 +86,11 @@ class AmbientOcclusion:
             f"pyvista_vdi.AmbientOcclusion; got {value!r}"
         )
 
-    def radius_in(self, volume: Geometry) -> float:
+    def radius_in(self, volume: Grid) -> float:
         """Return the radius in a volume, model units; beyond its diagonal nothing occludes."""
-        radius = DEFAULT_RADIUS * volume.length if self.radius is None else self.radius
-        return min(radius, volume.length)
+        return min(0.05 * volume.length if self.radius is None else self.radius, volume.length)
 
-    def to_dict(self, volume: Geometry) -> dict[str, Any]:
+    def to_dict(self, volume: Grid) -> dict[str, Any]:
         """Return what can be written to JSON, with the radius in this volume."""
         return {**asdict(self), "radius": self.radius_in(volume)}
 
@@ -122,16 +105,22 @@ class OcclusionGrid:
     ``cell``: voxels from node to node along x, y and z. ``nodes``: nodes along x, y and z; the last
     of them may lie beyond the volume. ``step``: length of a step, model units. ``offsets``:
     midpoints of the steps from the node along each direction, in cells; float64 (directions, steps,
-    3).
+    3). ``margin``: cells that the marches reach beyond the nodes, along x, y and z, either way.
+    ``padded``: nodes with the margin on both sides. ``samples`` along each edge of the box around a
+    node whose mean opacity the node gets: half a voxel apart, as marches by default, in cells of
+    one or two voxels; then no more.
     """
 
     cell: tuple[int, int, int]
     nodes: tuple[int, int, int]
     step: float
     offsets: NDArray[np.float64]
+    margin: tuple[int, int, int]
+    padded: tuple[int, int, int]
+    samples: tuple[int, int, int]
 
     @classmethod
-    def of(cls, volume: Geometry, occlusion: AmbientOcclusion) -> OcclusionGrid:
+    def of(cls, volume: Grid, occlusion: AmbientOcclusion) -> OcclusionGrid:
         """Return the grid for a volume."""
         radius = occlusion.radius_in(volume)
         spacing, points = np.array(volume.spacing), np.array(volume.dimensions)
@@ -143,30 +132,10 @@ class OcclusionGrid:
         along = (np.arange(steps) + 0.5) * (radius / steps)
         directions = spread_directions(occlusion.directions) @ to_cells.T
         nodes = -(-(points - 1) // cell) + 1
-        return cls(
-            _triple(cell),
-            _triple(nodes),
-            radius / steps,
-            directions[:, None, :] * along[None, :, None],
-        )
-
-    @property
-    def margin(self) -> tuple[int, int, int]:
-        """Cells that the marches reach beyond the nodes, along x, y and z, either way."""
-        return _triple(np.floor(np.abs(self.offsets).max(axis=(0, 1))).astype(int) + 1)
-
-    @property
-    def padded(self) -> tuple[int, int, int]:
-        """Nodes along x, y and z with the margin on both sides."""
-        return _triple(np.array(self.nodes) + 2 * np.array(self.margin))
-
-    @property
-    def samples(self) -> tuple[int, int, int]:
-        """Samples along each edge of the box around a node whose mean opacity the node gets.
-
-        Half a voxel apart, as marches by default, in cells of one or two voxels; then no more.
-        """
-        return _triple(np.minimum(2 * np.array(self.cell), 4))
+        offsets = directions[:, None, :] * along[None, :, None]
+        margin = np.floor(np.abs(offsets).max(axis=(0, 1))).astype(int) + 1
+        sizes = (margin, nodes + 2 * margin, np.minimum(2 * cell, 4))
+        return cls(_triple(cell), _triple(nodes), radius / steps, offsets, *map(_triple, sizes))
 
     @property
     def nbytes(self) -> int:

@@ -25,15 +25,6 @@ from pyvista_vdi.model.options import (
 )
 from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 
-#: What has gone or moved, and what is done in its place.
-_GONE = {
-    "skip_empty": "what is empty is passed by, without being asked",
-    "status": "print(actor.status)",
-    "target_fps": "the rate of a window is add_vdi's; the least rate of still frames is full_fps",
-    "resample": "make a uniform grid by PyVista, pyvista.ImageData(...).sample(grid)",
-    "mask": "set the ghosts (vtkGhostType) of what is left out to 2, or make its opacity 0",
-}
-
 
 def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) -> None:
     """Raise TypeError for the first argument whose name is not known, and say what is meant."""
@@ -45,24 +36,23 @@ def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) ->
         elsewhere = (each.elsewhere for each in RECORDS if name in vars(each)["declared"])
         near = difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
-        hint = _GONE.get(name) or next(filter(None, elsewhere), hint)
+        hint = next(filter(None, elsewhere), hint)
         if "settings" in known and name in options and options[name].setting:
             hint = f"pass it by settings=pyvista_vdi.Settings({name}=...)"
         raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")
 
 
-def _of_settings() -> type[Options]:
-    """Return a record of the options that are settings, of whichever record."""
-    records = (GenerationOptions, QualityTarget, Deferral, RenderOptions, DrawingOptions)
-    found = [
-        (name, told.kind, field(default=told.default, metadata={"option": told}))
-        for name, told in declared(*records).items()
-        if told.setting
-    ]
-    return record(make_dataclass("_Fields", found, bases=(Options,), frozen=True, kw_only=True))
-
-
-_Fields: Any = _of_settings()
+#: The options that are settings, of whichever record, as the fields of one.
+_FIELDS = [
+    (name, told.kind, field(default=told.default, metadata={"option": told}))
+    for name, told in declared(
+        GenerationOptions, QualityTarget, Deferral, RenderOptions, DrawingOptions
+    ).items()
+    if told.setting
+]
+_Fields: Any = record(
+    make_dataclass("_Fields", _FIELDS, bases=(Options,), frozen=True, kw_only=True)
+)
 
 
 class Settings(_Fields):  # type: ignore[misc]  # noqa: D101 - made of the options' texts
@@ -81,7 +71,7 @@ class Settings(_Fields):  # type: ignore[misc]  # noqa: D101 - made of the optio
     Examples
     --------
     >>> import pyvista_vdi as pvdi
-    >>> pvdi.Settings(tolerance=0.01, memory_limit="2 GiB").given
+    >>> pvdi.Settings(tolerance=0.01, memory_limit=2**31).given
     {{'memory_limit': 2147483648, 'tolerance': 0.01}}
     """
     __signature__ = inspect.signature(_Fields)
@@ -136,7 +126,7 @@ def takes(
     if hidden:
         what = f"options that are seldom turned; here {', '.join(sorted(hidden))}"
         shown["settings"] = Option("settings", None, what, kind="Settings | None")
-    other = dict(aliases or {})
+    other = aliases or {}
 
     def decorated(function: Callable[..., Any]) -> Callable[..., Any]:
         signature = _signature(function, records, shown, [*order])
@@ -199,31 +189,28 @@ def records_of(
     ``settings``, where they are among it, say some of them, which are taken by themselves only
     where they are to be ``flat``; ``defaults`` are others than declared.
     """
-    options = {name: told for each in records for name, told in each.declared.items()}
-    hidden = {name: told for name, told in options.items() if told.setting}
-    said = {**(defaults or {}), **_settings(given.pop("settings", None), function, hidden)}
-    direct = options if flat else options.keys() - hidden.keys()
-    said |= {name: given.pop(name) for name in direct if name in given}
+    options: dict[str, Option] = {}
+    for each in records:
+        options.update(each.declared)
+    hidden = [name for name, told in options.items() if told.setting]
+    settings = given.pop("settings", None)
+    if not isinstance(settings, Settings | None):
+        raise InvalidArgumentTypeError(f"settings must be a pyvista_vdi.Settings; got {settings!r}")
+    if settings and (without := [name for name in settings.given if name not in hidden]):
+        raise InvalidArgumentError(
+            f"{', '.join(without)} of the settings means nothing to {function}, which has "
+            f"{', '.join(sorted(hidden))}: leave it out"
+        )
+    said = {**(defaults or {}), **(settings.said if settings else {})}
+    for name in options:
+        if name in given and (flat or name not in hidden):
+            said[name] = given.pop(name)
     return [each.checked(**{n: said[n] for n in each.declared if n in said}) for each in records]
 
 
 def names_of(*records: Any) -> list[str]:
     """Return the arguments that records of options bring, ``settings`` among them."""
     return [n for n, told in declared(*records).items() if not told.setting] + ["settings"]
-
-
-def _settings(settings: Any, function: str, known: Mapping[str, Option]) -> dict[str, Any]:
-    """Return what settings say, or refuse what means nothing to a function."""
-    if settings is None:
-        return {}
-    if not isinstance(settings, Settings):
-        raise InvalidArgumentTypeError(f"settings must be a pyvista_vdi.Settings; got {settings!r}")
-    if without := [name for name in settings.given if name not in known]:
-        raise InvalidArgumentError(
-            f"{', '.join(without)} of the settings means nothing to {function}, which has "
-            f"{', '.join(sorted(known))}: leave it out"
-        )
-    return {name: value for name, value in settings.said.items() if name in known}
 
 
 def _documented(text: str, options: Iterable[Option]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -20,6 +20,9 @@ Matrix: TypeAlias = NDArray[np.float64]
 #: Largest width or height of a window, in pixels: four times 16k, far beyond any display.
 MAX_WINDOW_EDGE = 65536
 
+#: Arguments of a camera that are vectors, and their lengths.
+_VECTORS = {"position": 3, "focal_point": 3, "view_up": 3, "window_center": 2}
+
 
 def check_window_size(window_size: Sequence[int], *, name: str = "window_size") -> tuple[int, int]:
     """Return width and height in pixels as two Python ints; ``name`` is for errors.
@@ -30,22 +33,17 @@ def check_window_size(window_size: Sequence[int], *, name: str = "window_size") 
     try:
         width, height = window_size
         size = (int(width), int(height))
-        whole = size == (width, height)
+        if size == (width, height) and min(size) >= 1 and max(size) <= MAX_WINDOW_EDGE:
+            return size
     except (TypeError, ValueError, OverflowError):
-        whole = False
-    if not whole:
-        raise InvalidArgumentError(
-            f"{name} must be (width, height), two whole numbers of pixels; got {window_size!r}"
-        )
-    if not (1 <= size[0] <= MAX_WINDOW_EDGE and 1 <= size[1] <= MAX_WINDOW_EDGE):
-        raise InvalidArgumentError(
-            f"{name} must be between 1 and {MAX_WINDOW_EDGE} pixels along each edge; "
-            f"got {size[0]} x {size[1]}"
-        )
-    return size
+        pass
+    raise InvalidArgumentError(
+        f"{name} must be (width, height), from 1 to {MAX_WINDOW_EDGE} whole pixels each; "
+        f"got {window_size!r}"
+    )
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True)
 class Camera:
     """A view, with VTK's names and meanings.
 
@@ -80,41 +78,27 @@ class Camera:
         parallel to the direction of projection, or ``model_transform`` cannot be inverted.
     """
 
-    position: tuple[float, float, float]
-    focal_point: tuple[float, float, float]
-    view_up: tuple[float, float, float]
-    view_angle: float
-    parallel_projection: bool
-    parallel_scale: float
-    window_center: tuple[float, float]
-    use_horizontal_view_angle: bool
-    model_transform: Matrix = field(compare=False, repr=False)
+    position: Any
+    focal_point: Any
+    view_up: Any
+    _: KW_ONLY
+    view_angle: float = 30.0
+    parallel_projection: bool = False
+    parallel_scale: float = 1.0
+    window_center: Any = (0.0, 0.0)
+    use_horizontal_view_angle: bool = False
+    model_transform: Any = field(default=None, compare=False, repr=False)
     _transform: bytes = field(init=False, repr=False)
 
-    def __init__(
-        self,
-        position: ArrayLike,
-        focal_point: ArrayLike,
-        view_up: ArrayLike,
-        *,
-        view_angle: float = 30.0,
-        parallel_projection: bool = False,
-        parallel_scale: float = 1.0,
-        window_center: ArrayLike = (0.0, 0.0),
-        use_horizontal_view_angle: bool = False,
-        model_transform: ArrayLike | None = None,
-    ) -> None:
+    def __post_init__(self) -> None:
         put = object.__setattr__
-        put(self, "position", as_vector(position, "position", 3, InvalidCameraError))
-        put(self, "focal_point", as_vector(focal_point, "focal_point", 3, InvalidCameraError))
-        put(self, "view_up", as_vector(view_up, "view_up", 3, InvalidCameraError))
-        put(self, "view_angle", as_float(view_angle))
-        put(self, "parallel_projection", as_flag(parallel_projection, "parallel_projection"))
-        put(self, "parallel_scale", as_float(parallel_scale))
-        put(self, "window_center", as_vector(window_center, "window_center", 2, InvalidCameraError))
-        horizontal = as_flag(use_horizontal_view_angle, "use_horizontal_view_angle")
-        put(self, "use_horizontal_view_angle", horizontal)
-        put(self, "model_transform", _affine(model_transform))
+        for name, length in _VECTORS.items():
+            put(self, name, as_vector(getattr(self, name), name, length, InvalidCameraError))
+        for name in ("parallel_projection", "use_horizontal_view_angle"):
+            put(self, name, as_flag(getattr(self, name), name))
+        put(self, "view_angle", as_float(self.view_angle))
+        put(self, "parallel_scale", as_float(self.parallel_scale))
+        put(self, "model_transform", _affine(self.model_transform))
         put(self, "_transform", self.model_transform.tobytes())
         _ = self.axes  # which refuses what makes no view
 
@@ -157,18 +141,15 @@ class Camera:
                     f"focal_point, view_up); got {type(camera).__name__}"
                 ) from None
             return cls(position, focal_point, view_up, model_transform=model_transform)
-        reasons = []
-        if tuple(camera.GetViewShear()) != (0.0, 0.0, 1.0):
-            reasons.append("a view shear (SetViewShear)")
-        if camera.GetUseExplicitProjectionTransformMatrix():
-            reasons.append("an explicit projection matrix (SetExplicitProjectionTransformMatrix)")
-        if camera.GetUseOffAxisProjection():
-            reasons.append("an off-axis projection (SetUseOffAxisProjection)")
-        if camera.GetUserViewTransform() is not None or camera.GetUserTransform() is not None:
-            reasons.append("a user transform (SetUserTransform, SetUserViewTransform)")
-        if reasons:
+        lacking = {
+            "a view shear": tuple(camera.GetViewShear()) != (0.0, 0.0, 1.0),
+            "an explicit projection matrix": camera.GetUseExplicitProjectionTransformMatrix(),
+            "an off-axis projection": camera.GetUseOffAxisProjection(),
+            "a user transform": camera.GetUserTransform() or camera.GetUserViewTransform(),
+        }
+        if has := [name for name, there in lacking.items() if there]:
             raise UnsupportedError(
-                f"the camera has {' and '.join(reasons)}, which a VDI cannot honour: remove it"
+                f"the camera has {' and '.join(has)}, which a VDI cannot honour: remove it"
             )
         if model_transform is None:
             matrix = camera.GetModelTransformMatrix()
@@ -179,10 +160,10 @@ class Camera:
             camera.GetFocalPoint(),
             camera.GetViewUp(),
             view_angle=camera.GetViewAngle(),
-            parallel_projection=bool(camera.GetParallelProjection()),
+            parallel_projection=camera.GetParallelProjection(),
             parallel_scale=camera.GetParallelScale(),
             window_center=camera.GetWindowCenter(),
-            use_horizontal_view_angle=bool(camera.GetUseHorizontalViewAngle()),
+            use_horizontal_view_angle=camera.GetUseHorizontalViewAngle(),
             model_transform=model_transform,
         )
 
@@ -294,36 +275,30 @@ class Camera:
                 f"view_angle must lie between 0 and 180 degrees, both excluded; "
                 f"got {self.view_angle!r}"
             )
-        if not (math.isfinite(self.parallel_scale) and self.parallel_scale > 0):
+        if not 0 < self.parallel_scale < math.inf:
             raise InvalidCameraError(
                 f"parallel_scale must be a positive number of world units; "
                 f"got {self.parallel_scale!r}"
             )
         with np.errstate(over="ignore"):
             forward = np.subtract(self.focal_point, self.position)
-        if not np.isfinite(forward).all():
+        if not (np.isfinite(forward).all() and forward.any()):
+            wrong = "the same point" if np.isfinite(forward).all() else "too far apart for float64"
             raise InvalidCameraError(
-                f"the camera's position {self.position} and focal point {self.focal_point} are "
-                "too far apart for float64: move them closer"
-            )
-        if not np.any(forward):
-            raise InvalidCameraError(
-                f"the camera's position and focal point are the same point {self.position}: "
-                "move one of them"
-            )
-        if not np.any(self.view_up):
-            raise InvalidCameraError("view_up is the zero vector: give the direction that is up")
-        # sin of the angle between them; below 1e-12 float64 cannot tell which way is right
-        across = _cross(_unit(forward), _unit(np.asarray(self.view_up)))
-        if math.sqrt(across @ across) < 1e-12:
-            raise InvalidCameraError(
-                f"view_up {self.view_up} is parallel to the direction of projection "
-                f"{tuple(_unit(forward).tolist())}: choose another up direction"
+                f"the camera's position and focal point are {wrong}, {self.position} and "
+                f"{self.focal_point}: move one of them"
             )
         # By a power of two, which rounds nothing: squares may overflow
         forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
         forward = forward / math.sqrt(forward @ forward)
-        right = _cross(forward, _unit(np.asarray(self.view_up)))
+        up = np.asarray(self.view_up)
+        right = _cross(forward, _unit(up)) if up.any() else np.zeros(3)
+        # sin of the angle between them; below 1e-12 float64 cannot tell which way is right
+        if math.sqrt(right @ right) < 1e-12:
+            raise InvalidCameraError(
+                f"view_up {self.view_up} is zero or parallel to the direction of projection "
+                f"{tuple(forward.tolist())}: choose another up direction"
+            )
         right /= math.sqrt(right @ right)
         axes = np.array([right, _cross(right, forward), forward])
         axes.setflags(write=False)
@@ -350,18 +325,10 @@ class Camera:
         return matrix
 
     def half_extent(self, window_size: Sequence[int]) -> tuple[float, float]:
-        """Return half the viewport's width and height.
+        """Return half the width and height of a viewport of so many pixels.
 
-        Parameters
-        ----------
-        window_size : (int, int)
-            Width and height in pixels.
-
-        Returns
-        -------
-        tuple of float
-            ``(t_x, t_y)``, tangents of the half angles, in perspective; ``(s_x, s_y)``, world
-            units, in parallel projection.
+        ``(t_x, t_y)``, tangents of the half angles, in perspective; ``(s_x, s_y)``, world units, in
+        parallel projection.
         """
         width, height = check_window_size(window_size)
         aspect = width / height
@@ -373,19 +340,10 @@ class Camera:
         return tangent * aspect, tangent
 
     def viewport_matrix(self, window_size: Sequence[int]) -> Matrix:
-        """View space to homogeneous viewport coordinates.
+        """View space to homogeneous coordinates of a viewport of so many pixels, float64 (4, 4).
 
-        Parameters
-        ----------
-        window_size : (int, int)
-            Width and height in pixels.
-
-        Returns
-        -------
-        numpy.ndarray
-            float64 (4, 4), K with ``K [X, Y, Z, 1] = [u d, v d, Z, d]``: ``(u, v)`` in [-1, 1]²
-            is the viewport; ``d`` is Z in perspective and 1 in parallel projection
-            (docs/dev/conventions.md#list-coordinates).
+        K with ``K [X, Y, Z, 1] = [u d, v d, Z, d]``: ``(u, v)`` in [-1, 1]² is the viewport; ``d``
+        is Z in perspective and 1 in parallel projection (docs/dev/conventions.md#list-coordinates).
         """
         half_width, half_height = self.half_extent(window_size)
         denominator = 3 if self.parallel_projection else 2
@@ -395,23 +353,18 @@ class Camera:
         return matrix
 
     def ray_coefficients(self, window_size: Sequence[int]) -> tuple[Matrix, Matrix]:
-        """Rays through the viewport, in view space.
+        """Rays through a viewport of so many pixels, in view space: origins and directions.
 
-        Parameters
-        ----------
-        window_size : (int, int)
-            Width and height in pixels.
-
-        Returns
-        -------
-        origin, direction : numpy.ndarray
-            float64 (3, 3) each. The ray through ``(u, v)`` is ``P(t) = [1, u, v] @ origin +
-            t [1, u, v] @ direction``; its direction has Z = 1, so t is view depth.
+        float64 (3, 3) each. The ray through ``(u, v)`` is ``P(t) = [1, u, v] @ origin +
+        t [1, u, v] @ direction``; its direction has Z = 1, so t is view depth.
         """
         half_width, half_height = self.half_extent(window_size)
-        centre = [self.window_center[0] * half_width, self.window_center[1] * half_height, 0.0]
-        slope = np.array([centre, [half_width, 0.0, 0.0], [0.0, half_height, 0.0]])
-        forward = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+        c_x, c_y = self.window_center
+        slope = np.array(
+            [[c_x * half_width, c_y * half_height, 0.0], [half_width, 0, 0], [0, half_height, 0]]
+        )
+        forward = np.zeros((3, 3))
+        forward[0, 2] = 1.0
         if self.parallel_projection:
             return slope, forward
         return np.zeros((3, 3)), slope + forward
@@ -429,11 +382,14 @@ class Camera:
 
 def _affine(value: ArrayLike | None) -> Matrix:
     matrix = np.eye(4) if value is None else as_floats(value)
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-        raise InvalidCameraError(f"model_transform must be 4 x 4 finite numbers; got {value!r}")
-    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+    if (
+        matrix.shape != (4, 4)
+        or not np.isfinite(matrix).all()
+        or not np.array_equal(matrix[3], [0, 0, 0, 1])
+    ):
         raise InvalidCameraError(
-            f"model_transform must be affine: its last row is {matrix[3].tolist()}, not 0 0 0 1"
+            "model_transform must be 4 x 4 finite numbers, affine: with a last row of 0 0 0 1; "
+            f"got {value!r}"
         )
     # Scale-free: the determinant against the product of the column lengths (Hadamard's bound)
     columns = np.abs(matrix[:3, :3]).max(axis=0)  # first, because squares may overflow
@@ -441,8 +397,7 @@ def _affine(value: ArrayLike | None) -> Matrix:
         columns *= np.linalg.norm(matrix[:3, :3] / columns, axis=0)
     if not columns.all() or abs(np.linalg.det(matrix[:3, :3] / columns)) < 1e-12:
         raise InvalidCameraError(
-            "model_transform cannot be inverted: it flattens space "
-            f"(matrix {matrix[:3, :3].tolist()})"
+            f"model_transform cannot be inverted: it flattens space; got {value!r}"
         )
     matrix.setflags(write=False)
     return matrix
@@ -454,10 +409,7 @@ def _unit(vector: Matrix) -> Matrix:
     return np.asarray(vector / math.sqrt(vector @ vector))
 
 
-# For three numbers, of which a frame has dozens: np.cross takes 50 times as long, and
-# np.linalg.norm, in place of the root of a product, five times. The same bits.
-
-
 def _cross(a: Matrix, b: Matrix) -> Matrix:
+    # A frame has dozens of them: np.cross takes 50 times as long for three numbers
     (x, y, z), (u, v, w) = a.tolist(), b.tolist()
     return np.array([y * w - z * v, z * u - x * w, x * v - y * u])

@@ -6,7 +6,6 @@ asked for it.
 
 import difflib
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,14 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
-
-#: Bytes in units of memory, by their names in lower case.
-_UNITS = {
-    "": 1,
-    "b": 1,
-    **{f"{prefix}b": 1000 ** (k + 1) for k, prefix in enumerate("kmgt")},
-    **{f"{prefix}ib": 1024 ** (k + 1) for k, prefix in enumerate("kmgt")},
-}
 
 
 def as_float(value: Any) -> float:
@@ -42,12 +33,6 @@ def as_whole(value: Any) -> float:
     """Return :func:`as_number` of a whole number, NaN where ``value`` is none."""
     number = as_number(value)
     return number if number % 1 == 0 else math.nan
-
-
-def not_taken(value: Any) -> type[InvalidArgumentError]:
-    """Return the error by which ``value`` is refused where a number is wanted."""
-    number = isinstance(value, int | float | np.number)
-    return InvalidArgumentError if number else InvalidArgumentTypeError
 
 
 def as_flag(value: Any, name: str) -> bool:
@@ -119,22 +104,6 @@ def as_range(values: Any) -> tuple[float, float]:
     return as_float(low), as_float(high)
 
 
-def three_wholes(values: Any, what: str, least: int) -> tuple[int, int, int]:
-    """Return three whole numbers, of which none is below the least.
-
-    ``what`` says what they are: the argument's name, and what it means.
-
-    Raises InvalidArgumentError if they are no such numbers.
-    """
-    try:
-        x, y, z = (as_whole(k) for k in values)
-    except (TypeError, ValueError):
-        x = y = z = math.nan
-    if not (x >= least and y >= least and z >= least):
-        raise InvalidArgumentError(f"{what}, three whole numbers from {least}; got {values!r}")
-    return int(x), int(y), int(z)
-
-
 def as_floats(values: Any) -> NDArray[np.float64]:
     """Return numbers as a new float64 array, of shape (0,) where they are none."""
     try:
@@ -163,27 +132,3 @@ def as_bounds(bounds: Any, error: type[ValueError] = InvalidArgumentError) -> An
             f"bounds must be six finite numbers x0 <= x1, y0 <= y1, z0 <= z1; got {bounds!r}"
         )
     return tuple(box.tolist())
-
-
-def memory_limit_bytes(memory_limit: Any) -> int | None:
-    """Return a memory limit in bytes.
-
-    ``memory_limit``: bytes, or a text with a unit: ``"2 GiB"`` (2^30 bytes), ``"2 GB"`` (10^9), KiB
-    to TiB. Returns: ``None`` where there is none. Raises InvalidArgumentError if it is no size
-    above 0.
-    """
-    if memory_limit is None:
-        return None
-    unit, number = 1, math.nan
-    if isinstance(memory_limit, str):
-        match = re.fullmatch(r"\s*([\d.]+(?:e\+?\d+)?)\s*([a-z]*)\s*", memory_limit.lower())
-        if match and match[2] in _UNITS:
-            unit, number = _UNITS[match[2]], as_float(match[1])
-    elif not isinstance(memory_limit, bool | np.bool_):
-        number = as_float(memory_limit)
-    if not 1 <= number * unit < 2**63:
-        raise InvalidArgumentError(
-            "memory_limit must be a number of bytes above 0, or a text such as '2 GiB' or "
-            f"'800 MB'; got {memory_limit!r}"
-        )
-    return int(number * unit)

@@ -8,7 +8,7 @@ import importlib
 import itertools
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +20,25 @@ from pyvista_vdi.errors import InvalidVolumeError, VDIError
 #: Chunks of arrays that have none.
 _CHUNK_POINTS = 64
 
+#: Voxel types that the kernels read as they are.
+VOXEL_TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
+
+#: Types that one of those represents without loss; of 64-bit integers those up to 2^53.
+_WIDENED = {"bool": "uint8", "float16": "float32", "int64": "float64", "uint64": "float64"}
+
+#: Attributes by which arrays in files say that their values are others than those that are stored.
+_PACKING = ("scale_factor", "add_offset", "_Unsigned")
+
 
 class ChunkedArray:
     """A three-dimensional array in chunks, of which parts are read as NumPy arrays.
 
     ``source``: whatever has ``shape``, ``dtype``, ``chunks`` and is indexed by slices. ``index``:
     what is taken of a source that has more dimensions, time and channel say: a number for each axis
-    that is left out, ``slice(None)`` for z, y and x. ``name``: what messages call it. ``checked``:
-    turns what was read into what a volume holds: widened, native, C-contiguous. ``dtype``: of that.
+    that is left out, ``slice(None)`` for z, y and x.
+
     ``shape``, ``dtype``, ``ndim``, ``size``, ``nbytes``: as of a NumPy array (z, y, x). ``chunks``:
-    points of a chunk along z, y and x; the last ones may have fewer. ``source``: what messages call
+    points of a chunk along z, y and x, some of which may have fewer. ``source``: what messages call
     it. ``lazy``: the array as Dask has it, if it does.
     """
 
@@ -40,12 +49,13 @@ class ChunkedArray:
         source: Any,
         *,
         index: Sequence[int | slice] | None = None,
-        name: str | None = None,
-        checked: Callable[[NDArray[Any]], NDArray[Any]] | None = None,
-        dtype: Any = None,
     ) -> None:
-        library = type(source).__module__.partition(".")[0]
-        self.lazy = source if library == "dask" else None
+        if said := [name for name in _PACKING if name in getattr(source, "attrs", {})]:
+            raise InvalidVolumeError(
+                f"the array's values are packed ({', '.join(said)}): open it by xarray, which "
+                'unpacks them, and give pyvista_vdi.Volume(dataset["name"].data)'
+            )
+        self.lazy = source if _library(source) == "dask" else None
         self._array = source
         self._index = tuple(index) if index is not None else (slice(None),) * 3
         if self.lazy is not None and index is not None:
@@ -58,51 +68,32 @@ class ChunkedArray:
                 "time and channel (pyvista_vdi.read_volume does), index the array, or load "
                 "colours, Volume(numpy.asarray(array))"
             )
+        file = _file_of(source)
+        self.source = f"the {_library(source)} array of shape {tuple(source.shape)}"
+        self.source += f" in {file}" if file else ""
         if any(math.isnan(n) for n in self._array.shape):
             raise InvalidVolumeError(
-                f"{_described(source)} does not know how long its chunks are: call "
+                f"{self.source} does not know how long its chunks are: call "
                 "array.compute_chunk_sizes() first, which computes it for that"
             )
         z, y, x = (int(self._array.shape[k]) for k in kept)
         self.shape: tuple[int, int, int] = (z, y, x)
-        self.dtype = np.dtype(dtype if dtype is not None else source.dtype)
+        self.dtype = voxel_type(source.dtype)
         self.size = math.prod(self.shape)
         self.nbytes = self.size * self.dtype.itemsize
-        self.chunks = self._chunks(kept)
-        self.source = name or _described(source)
-        self._checked = checked
-        if self.lazy is not None and (checked is not None or self.dtype != source.dtype):
-            self.lazy = self._array = self.lazy.map_blocks(
-                _held, checked, self.dtype, dtype=self.dtype
-            )
-
-    def _chunks(self, kept: Sequence[int]) -> tuple[int, int, int]:
+        # Dask has the lengths of all chunks along an axis
         chunks: Any = getattr(self._array, "chunks", None) or (_CHUNK_POINTS,) * len(self._index)
-        # Dask has the lengths of all chunks along an axis, of which the last may be shorter
-        along = [(chunks[k],) if isinstance(chunks[k], int) else tuple(chunks[k]) for k in kept]
-        lengths = [max(of_axis) for of_axis in along]
-        if any(n != max(of_axis) for of_axis in along for n in of_axis[:-1]):
-            raise InvalidVolumeError(
-                f"the chunks of {_described(self._array)} are of different lengths along an axis: "
-                "rechunk the array (array.rechunk((128, 128, 128)))"
-            )
-        z, y, x = (min(int(length), n) for length, n in zip(lengths, self.shape, strict=True))
-        return z, y, x
-
-    def __len__(self) -> int:
-        return self.shape[0]
+        self.chunks = tuple(
+            min(int(np.max(chunks[k])), n) for k, n in zip(kept, self.shape, strict=True)
+        )
+        if self.lazy is not None and self.dtype != source.dtype:
+            self.lazy = self._array = self.lazy.map_blocks(held, dtype=self.dtype)
 
     def __getitem__(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Read a part: three slices of step 1 (z, y, x)."""
-        if (
-            not isinstance(box, tuple)
-            or len(box) != 3
-            or not all(isinstance(part, slice) and part.step in (None, 1) for part in box)
-        ):
-            raise InvalidVolumeError(
-                f"{self.source} is read by three slices of step 1 (z, y, x); got {box!r}: "
-                "load the volume (volume.load()) for anything else"
-            )
+        boxes = isinstance(box, tuple) and all(isinstance(part, slice) for part in box)
+        if not boxes or len(box) != 3 or any(part.step not in (None, 1) for part in box):
+            raise self._needed_whole()
         parts = iter(box)
         at = tuple(next(parts) if isinstance(k, slice) else k for k in self._index)
         try:
@@ -113,16 +104,13 @@ class ChunkedArray:
             raise
         except Exception as error:  # each library, and each function of Dask's, has its own
             points = ", ".join(f"{part.start or 0}:{part.stop}" for part in box)
+            remedy = "the chunk there is damaged or lost; copy it from its source again"
             raise InvalidVolumeError(
                 f"{self.source} cannot be read at its points [{points}] "
                 f"({type(error).__name__}: {error}): "
-                + (
-                    "what computes them fails"
-                    if self.lazy is not None
-                    else "the chunk there is damaged or lost; copy it from its source again"
-                )
+                f"{remedy if self.lazy is None else 'what computes them fails'}"
             ) from error
-        return _held(found, self._checked, self.dtype)
+        return held(found)
 
     def __array__(self, *_: Any, **__: Any) -> NDArray[Any]:
         """Refuse to become one array in memory by accident."""
@@ -136,9 +124,9 @@ class ChunkedArray:
 
     def _needed_whole(self) -> InvalidVolumeError:
         return InvalidVolumeError(
-            f"{self.source} is read chunk by chunk, and this needs all of its "
-            f"{self.nbytes / 2**30:.3g} GiB in memory: pyvista_vdi.generate makes a VDI of it "
-            "block by block; volume.load() reads it whole"
+            f"{self.source} is read chunk by chunk, by three slices of step 1 (z, y, x), and this "
+            f"needs all of its {self.nbytes / 2**30:.3g} GiB in memory: pyvista_vdi.generate makes "
+            "a VDI of it block by block; volume.load() reads it whole"
         )
 
     @property
@@ -161,7 +149,6 @@ class ChunkedArray:
         return float(np.fmin.reduce(low)), float(np.fmax.reduce(high))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave an open HDF5 file behind: it is opened where this is unpickled."""
         return {**self.__dict__, "_array": closed(self._array)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -171,20 +158,23 @@ class ChunkedArray:
         return f"ChunkedArray({self.source}, {self.shape} {self.dtype}, chunks={self.chunks})"
 
 
+def _library(thing: Any) -> str:
+    return type(thing).__module__.partition(".")[0]
+
+
 def _file_of(array: Any) -> Path | None:
     """Return an array's file, or its folder, if it is in any here."""
-    library = type(array).__module__.partition(".")[0]
-    if library == "h5py":
+    if _library(array) == "h5py":
         return Path(array.file.filename).absolute()
     # A local store has its folder as `root` in zarr 3, and as `path` in zarr 2 and by fsspec
     store = getattr(array, "store", None)
     root = Path(str(getattr(store, "root", None) or getattr(store, "path", None)))
-    return root / array.path if library == "zarr" and root.is_dir() else None
+    return root / array.path if _library(array) == "zarr" and root.is_dir() else None
 
 
 def closed(array: Any) -> Any:
-    """Return what is pickled in place of an array: of an HDF5 file's, where it is."""
-    if type(array).__module__.partition(".")[0] == "h5py":
+    """Return what is pickled in place of an array: an HDF5 file's is opened again."""
+    if _library(array) == "h5py":
         return os.path.abspath(array.file.filename), array.name  # noqa: PTH100 - no links
     return array
 
@@ -201,24 +191,30 @@ def is_chunked(array: Any) -> bool:
     """Whether an array is one that is read chunk by chunk, by who made it."""
     return isinstance(array, ChunkedArray) or (
         not isinstance(array, np.ndarray)
-        and type(array).__module__.partition(".")[0] in ("dask", "zarr", "h5py")
+        and _library(array) in ("dask", "zarr", "h5py")
         and all(hasattr(array, name) for name in ("shape", "dtype", "chunks"))
     )
 
 
-def _held(values: Any, checked: Callable[[Any], Any] | None, dtype: Any) -> NDArray[Any]:
-    """Return what was read as a volume holds it."""
-    array = np.asarray(values) if checked is None else checked(np.asarray(values))
-    return np.ascontiguousarray(array, dtype=dtype)
+def voxel_type(dtype: Any) -> np.dtype[Any]:
+    """Return the type that voxels of a type are held as: widened, where kernels do not read it."""
+    kind = np.dtype(dtype).newbyteorder("=").name
+    if _WIDENED.get(kind, kind) not in VOXEL_TYPES:
+        known = ", ".join(VOXEL_TYPES)
+        raise InvalidVolumeError(
+            f"voxels of type {dtype} are not supported: convert to one of {known}"
+        )
+    return np.dtype(_WIDENED.get(kind, kind))
 
 
-def _described(source: Any) -> str:
-    library = type(source).__module__.partition(".")[0]
-    if library == "h5py":
-        return f"{source.file.filename}::{source.name}"
-    if library == "zarr":
-        store, path = getattr(source, "store", ""), getattr(source, "path", "")
-        # Those of zarr 2, which are mappings, have no name but their path
-        where = getattr(store, "path", store) if isinstance(store, Mapping) else store
-        return f"the zarr array {where}/{path}".rstrip("/ ")
-    return f"the {library} array of shape {tuple(source.shape)}"
+def held(values: Any) -> NDArray[Any]:
+    """Return values as a volume holds them: widened without loss, native, C-contiguous."""
+    array = np.asarray(values)
+    if array.dtype.kind in "iu" and array.dtype.itemsize == 8 and array.size:
+        widest = max(abs(int(array.min())), abs(int(array.max())))
+        if widest > 2**53:
+            raise InvalidVolumeError(
+                f"voxels of type {array.dtype} hold values up to {widest}, which float64 cannot "
+                "represent exactly: scale them, or convert them yourself"
+            )
+    return np.ascontiguousarray(array, dtype=voxel_type(array.dtype))

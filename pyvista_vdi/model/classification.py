@@ -103,10 +103,7 @@ class Look(Described):
         "classification='deferred', which keeps values"
     )
 
-    clim: RangeLike | None = option(
-        None,
-        "range of the colour map; that of all values by default",
-    )
+    clim: RangeLike | None = option(None, "range of the colour map; that of all values by default")
     n_colors: int = option(
         256,
         "entries of the colour map",
@@ -119,10 +116,7 @@ class Look(Described):
         "As in ``add_volume``: an array of length ``n_colors`` is taken as it is, 0 to 255; a "
         "shorter one is 0 to 1 and interpolated.",
     )
-    cmap: ColorMapLike | None = option(
-        None,
-        "colour map; the theme's by default",
-    )
+    cmap: ColorMapLike | None = option(None, "colour map; the theme's by default")
     flip_scalars: bool = option(False, "reverse the colour map")
     opacity_unit_distance: float | None = option(
         None,
@@ -142,8 +136,7 @@ class Look(Described):
     specular: float | None = option(0.2, "specular light that is reflected, where shaded")
     specular_power: float | None = option(10.0, "how narrow highlights are, where shaded")
     interpolation: Interpolation = option(
-        "nearest",
-        'between voxels; ``add_volume`` draws ``"nearest"``',
+        "nearest", 'between voxels; ``add_volume`` draws ``"nearest"``'
     )
 
 
@@ -156,25 +149,18 @@ class Classification(Look, ArrayChoice):
     that it replaces, or a value cannot be used.
     """
 
-    volume_property: VTKObject | None = option(
-        None,
-        "in place of the others, as it is",
-    )
+    volume_property: VTKObject | None = option(None, "in place of the others, as it is")
     transfer_function: TransferFunction | None = option(
         None, "in place of the others; it needs no PyVista"
     )
 
     def __post_init__(self) -> None:
         in_place = [name for name in IN_PLACE if getattr(self, name) is not None]
-        if len(in_place) > 1:
+        replaced = [*in_place[1:], *sorted({*self.given} & {*Look.declared})]
+        if in_place and replaced:
             raise InvalidArgumentError(
-                "volume_property and transfer_function were both given: pass one of them"
-            )
-        replaced = sorted({*self.given} & {*Look.declared}) if in_place else ()
-        if replaced:
-            raise InvalidArgumentError(
-                f"{in_place[0]} stands in place of {', '.join(replaced)}: leave out either "
-                f"{in_place[0]} or the {'others' if len(replaced) > 1 else 'other'}"
+                f"{in_place[0]} stands in place of {', '.join(replaced)}: leave out the one or the "
+                "other"
             )
         super().__post_init__()
 
@@ -223,9 +209,8 @@ class Classification(Look, ArrayChoice):
             )
         if self.volume_property is not None:
             from_property = registry.method("TransferFunction.from_property")
-            return from_property(  # type: ignore[no-any-return]
-                self.volume_property, volume, rgba=volume.rgba
-            )
+            made: TransferFunction = from_property(self.volume_property, volume, rgba=volume.rgba)
+            return made
         if find_spec("pyvista") is None:
             raise MissingDependencyError(
                 "colour maps and opacities by name are built by PyVista, which is not installed: "
@@ -236,9 +221,8 @@ class Classification(Look, ArrayChoice):
         arguments["clim"] = range_to_classify(self.scalars, self.clim)
         from_arguments = registry.method("TransferFunction.from_arguments")
         scalars = volume.array if volume.rgba else np.array(volume.finite_range())
-        return from_arguments(  # type: ignore[no-any-return]
-            scalars, rgba=volume.rgba, **arguments
-        )
+        built: TransferFunction = from_arguments(scalars, rgba=volume.rgba, **arguments)
+        return built
 
 
 def _plain(value: Any) -> Any:

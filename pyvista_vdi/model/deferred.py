@@ -13,7 +13,7 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVDIError
 from pyvista_vdi.model.checks import as_number, as_range
 from pyvista_vdi.model.packing import check_precision
-from pyvista_vdi.model.vdi import VDI, Lists, lengths_of, with_arrays
+from pyvista_vdi.model.vdi import VDI, Lists, lengths_of, made_vdi
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +48,8 @@ class DeferredVDI(Lists):
         If something breaks a rule; the message names it and the rule.
     """
 
+    #: Its lists in the form of a VDI, for storage: colours are no colours (docs/files.md).
+    lists: VDI
     value_range: tuple[float, float]
     unit_distance: float
     sample_distance: float
@@ -77,13 +79,7 @@ class DeferredVDI(Lists):
             setattr(self, name, length)
         for name in ("camera", "window_size", "bounds", "depth_origin", "metadata"):
             setattr(self, name, getattr(lists, name))
-        self._lists = lists
-        lists.kept = self.about
-
-    @property
-    def lists(self) -> VDI:
-        """Its lists in the form of a VDI, for storage: colours are no colours (docs/files.md)."""
-        return self._lists
+        self.lists = lists
 
     @property
     def about(self) -> dict[str, Any]:
@@ -99,7 +95,7 @@ class DeferredVDI(Lists):
     @cached_property
     def mean(self) -> NDArray[np.float32]:
         """Mean by length, as a share of the range of values, float32 (n,)."""
-        color = self._lists.color
+        color = self.lists.color
         mean = color[:, 0]
         if self.precision != "exact":  # two bytes: what is left below the first is in the second
             mean = np.minimum(mean + color[:, 1] / np.float32(255), np.float32(1))
@@ -109,33 +105,18 @@ class DeferredVDI(Lists):
     @property
     def spread(self) -> NDArray[np.float32]:
         """Standard deviation by length, as a share of the range of values, float32 (n,)."""
-        return self._lists.optical_depth
+        return self.lists.optical_depth
 
     @property
     def share(self) -> NDArray[np.float32]:
         """Share of the length that holds values of the range, float32 (n,)."""
-        return self._lists.color[:, 2]
+        return self.lists.color[:, 2]
 
     @cached_property
     def steps(self) -> NDArray[np.float32]:
         """Steps of the march through what each supersegment holds, float32 (n,)."""
-        length = lengths_of(self._lists) / self.sample_distance
+        length = lengths_of(self.lists) / self.sample_distance
         return (length * self.share).astype(np.float32)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays in memory."""
-        return self._lists.nbytes
-
-    @property
-    def precision(self) -> str:
-        """What a supersegment takes in a file: see :meth:`with_precision`."""
-        return self._lists.precision
-
-    def equals(self, other: object) -> bool:
-        """Whether all arrays, the view, the bounds and the range are the same to the last bit."""
-        same = isinstance(other, DeferredVDI) and self.about == other.about
-        return same and self._lists.equals(other.lists)  # type: ignore[attr-defined]
 
     def with_precision(self, precision: str) -> DeferredVDI:
         """Return it with supersegments of fewer bytes: ``"exact"``, ``"8-byte"``.
@@ -145,7 +126,7 @@ class DeferredVDI(Lists):
         """
         if check_precision(precision) == self.precision:
             return self
-        lists = self._lists
+        lists = self.lists
         mean = self.mean.astype(np.float64)
         low, spread = np.zeros_like(mean), lists.optical_depth
         if precision == "8-byte":
@@ -155,7 +136,7 @@ class DeferredVDI(Lists):
             fraction, exponent = np.frexp(spread)
             spread = np.ldexp(np.round(fraction * 16) / 16, exponent)
         color = np.stack([mean, low, self.share], axis=1).astype(np.float32)
-        plain = with_arrays(lists, lists.arrays._replace(color=color, optical_depth=spread))
+        plain = made_vdi(lists.arrays._replace(color=color, optical_depth=spread), lists)
         return DeferredVDI(plain.with_precision(precision), self.about)
 
     def classified(self, **look: Any) -> VDI:
@@ -168,7 +149,7 @@ class DeferredVDI(Lists):
             ``opacity``, ``clim`` (the range of values by default), ``n_colors``,
             ``flip_scalars``, ``log_scale``, ``opacity_unit_distance``; or ``volume_property`` or
             ``transfer_function`` in place of them. And ``device``, where it is computed: by
-            default as for :func:`pyvista_vdi.render`, and on the host where there is none.
+            default as for :func:`pyvista_vdi.render`.
 
         Returns
         -------
@@ -179,13 +160,8 @@ class DeferredVDI(Lists):
         ------
         UnsupportedError
             If the transfer function asks for light or gradient opacity, which no list knows.
-        InvalidArgumentError, MissingDependencyError
+        InvalidArgumentError, MissingDependencyError, NoDeviceError
             As for :func:`pyvista_vdi.generate`.
-
-        Warns
-        -----
-        VDIWarning
-            If the transfer function shows values outside :attr:`value_range`, with their share.
 
         Examples
         --------
@@ -197,4 +173,4 @@ class DeferredVDI(Lists):
 
     def __repr__(self) -> str:
         low, high = self.value_range
-        return repr(self._lists).replace("VDI(", "DeferredVDI(")[:-1] + f", {low:g} to {high:g})"
+        return repr(self.lists).replace("VDI(", "DeferredVDI(")[:-1] + f", {low:g} to {high:g})"

@@ -29,13 +29,16 @@ class GrowingArray:
     """A float32 array whose number of elements is known when the last one is written.
 
     Systems take memory as it is written, so room for the most that there may be costs nothing. Only
-    where that is refused do its elements, of the shape ``item``, move when it grows. ``room``:
-    elements that there is room for.
+    where that is refused do its elements, of the shape ``item``, move when it grows.
     """
 
     def __init__(self, item: tuple[int, ...] = ()) -> None:
-        self._item, self._bytes = item, 4 * math.prod(item)
-        self._raw, self._start, self.room = np.empty(0, np.uint8), 0, 0  # from where it is aligned
+        self._item, self._array = item, aligned_empty((0, *item), np.float32)
+
+    @property
+    def room(self) -> int:
+        """Elements that there is room for."""
+        return len(self._array)
 
     def reserve(self, n: int, most: int) -> None:
         """Make room for at least n elements (MemoryError), for the most if it can be had."""
@@ -43,24 +46,26 @@ class GrowingArray:
             if n <= self.room:
                 return
             try:
-                raw = np.empty(room * self._bytes + HOST_ALIGNMENT, np.uint8)
+                larger = aligned_empty((room, *self._item), np.float32)
             except MemoryError:
                 if room == n:
                     raise
                 continue
-            start, kept = -raw.ctypes.data % HOST_ALIGNMENT, self.room * self._bytes
-            raw[start : start + kept] = self._raw[self._start : self._start + kept]
-            self._raw, self._start, self.room = raw, start, room
+            larger[: self.room] = self._array
+            self._array = larger
 
     def part(self, first: int, last: int) -> NDArray[Any]:
         """Return elements to write, a view that is valid until the next call of another method."""
-        begin, end = self._start + first * self._bytes, self._start + last * self._bytes
-        return self._raw[begin:end].view(np.float32).reshape(last - first, *self._item)
+        return self._array[first:last]
 
     def finished(self, n: int) -> NDArray[Any]:
         """Return the first n elements; the room for others is given back."""
-        self._raw.resize(self._start + n * self._bytes, refcheck=False)
-        return self.part(0, n)
+        raw: Any = self._array.base
+        start = self._array.ctypes.data - raw.ctypes.data
+        end = start + self._array[:n].nbytes
+        raw.resize(end, refcheck=False)
+        self._array = raw[start:end].view(np.float32).reshape(n, *self._item)
+        return self._array
 
 
 def require_host_memory(nbytes: int, what: str, remedy: str, *, free: bool = False) -> None:

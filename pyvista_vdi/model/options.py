@@ -26,7 +26,6 @@ from pyvista_vdi.model.checks import (
     as_flag,
     as_range,
     check_callback,
-    memory_limit_bytes,
     one_of,
 )
 from pyvista_vdi.model.lighting import Lights
@@ -59,6 +58,9 @@ QUALITIES: dict[str, float | None] = {
 
 #: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
 _INDISTINGUISHABLE = 1e-6
+
+#: What may be said of bytes.
+_BYTES = Number("a whole number of bytes above 0", 1, whole=True)
 
 _Record = TypeVar("_Record", bound="Options")
 
@@ -113,7 +115,6 @@ _WORDS = {
     "DeviceLike": "str or int",
     "LightsLike": "renderer, or sequence of Light, vtkLight or pyvista.Light",
     "MatrixLike": "array_like, shape (4, 4)",
-    "MemoryLike": "int, float or str",
     "OcclusionLike": "bool, float or AmbientOcclusion",
     "OpacityLike": "str or float or array_like",
     "Policy": '{"auto", "never"}',
@@ -242,10 +243,9 @@ class MediumOptions(Options):
     memory_limit: int | None = option(
         None,
         "most memory to take on the device",
-        'Bytes, or a text such as ``"2 GiB"``; by default what the device has. A volume that does '
-        "not fit goes there brick by brick, which takes more time and changes no bit.",
-        check=memory_limit_bytes,
-        takes="MemoryLike | None",
+        "Bytes; by default what the device has. A volume that does not fit goes there brick by "
+        "brick, which takes more time and changes no bit.",
+        check=_BYTES,
         setting=True,
     )
 
@@ -369,12 +369,12 @@ class QualityTarget(Options):
         "``full_fps`` and ``max_bytes`` have the scene measured on the device, once. All choose "
         "the VDI's ``window_size``, ``max_supersegments`` and ``precision``, so that these and "
         "``tolerance`` cannot be given as well, and ``window_size`` is that of the pictures. "
-        '``vdi.metadata["dial"]`` or ``actor.status.dial`` says what was chosen: docs/dial.md.',
+        '``vdi.metadata["dial"]`` says what was chosen: docs/dial.md.',
     )
     target_ssim: float | None = option(
         None,
         "SSIM that pictures are to have, 0 to 1",
-        "In place of ``quality``: at ``target_angle``, against volume rendering.",
+        "In place of ``quality``: 30 degrees from V_O, against volume rendering.",
         check=Number("an SSIM between 0 and 1", 0, 1, open_ended=True),
     )
     full_fps: float | None = option(
@@ -387,14 +387,7 @@ class QualityTarget(Options):
         None,
         "most bytes of the VDI on the device",
         "Not of files. Goes before all others; limits alone give the best that is within them.",
-        check=Number("a number of bytes above 0", open_ended=True),
-        takes="float | None",
-    )
-    target_angle: float = option(
-        30.0,
-        "degrees by which the view is turned from V_O for which the SSIM is predicted",
-        check=Number("an angle between 0 and 180 degrees", 0, 180, open_ended=True),
-        setting=True,
+        check=_BYTES,
     )
 
     def __post_init__(self) -> None:
@@ -404,8 +397,6 @@ class QualityTarget(Options):
                 "pictures are to be: give one of them"
             )
         super().__post_init__()
-        if self.max_bytes is not None:
-            object.__setattr__(self, "max_bytes", int(self.max_bytes))
         if self.quality == "reference" and (self.full_fps, self.max_bytes) != (None, None):
             raise InvalidArgumentError(
                 "quality='reference' is what is made without a dial, so that full_fps and "
@@ -420,10 +411,6 @@ class QualityTarget(Options):
     def __bool__(self) -> bool:
         """Whether anything is asked for, so that settings are to be chosen."""
         return (self.ssim, self.full_fps, self.max_bytes) != (None, None, None)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what was asked for, by the names of the arguments."""
-        return {name: value for name, value in self.given.items() if name != "target_angle"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -448,6 +435,4 @@ class GenerationRequest:
         object.__setattr__(self, "camera", Camera.from_any(self.camera))
         object.__setattr__(self, "window_size", check_window_size(self.window_size))
 
-    def replace(self, **changes: Any) -> GenerationRequest:
-        """Return the same request but for some of its fields."""
-        return replace(self, **changes)
+    replace = replace

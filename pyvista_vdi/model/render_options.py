@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import Number
+from pyvista_vdi.model.checks import Number, as_floats
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.options import Options, option, record
 from pyvista_vdi.model.types import Coverage, Draw, Policy
@@ -34,19 +34,15 @@ def checked_planes(planes: Any) -> Planes:
 
     InvalidArgumentError if the shape is another, a value is not finite or a normal is zero.
     """
-    if planes is None:
+    if planes is None or (np.iterable(planes) and not [*planes]):
         return ()
-    wanted = "clipping_planes must be (k, 6) finite numbers, origin and normal of each plane"
-    try:
-        table = np.asarray(planes, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidArgumentError(f"{wanted}; got {planes!r}") from error
-    if table.size == 0:
-        return ()
-    if table.ndim != 2 or table.shape[1] != 6 or not np.isfinite(table).all():
-        raise InvalidArgumentError(f"{wanted}; got shape {table.shape}")
-    if not table[:, 3:].any(axis=1).all():
-        raise InvalidArgumentError("a clipping plane's normal is zero: give its direction")
+    table = as_floats(planes)
+    shaped = table.ndim == 2 and table.shape[1] == 6 and np.isfinite(table).all()
+    if not shaped or not table[:, 3:].any(axis=1).all():
+        raise InvalidArgumentError(
+            "clipping_planes must be (k, 6) finite numbers, origin and normal of each plane, which "
+            f"is not zero; got {planes!r}"
+        )
     return tuple(map(tuple, table.tolist()))
 
 
@@ -112,9 +108,7 @@ class RenderOptions(SceneOptions):
     )
     skip_empty: bool = True
 
-    def replace(self, **changes: Any) -> RenderOptions:
-        """Return the same options but for some of them."""
-        return replace(self, **changes)
+    replace = replace
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,9 +134,7 @@ class FrameRequest:
         put(self, "camera", Camera.from_any(self.camera))
         put(self, "size", check_window_size(self.size))
 
-    def replace(self, **changes: Any) -> FrameRequest:
-        """Return the same request but for some of its fields."""
-        return replace(self, **changes)
+    replace = replace
 
 
 @record
@@ -156,12 +148,6 @@ class DrawingOptions(Options):
         "By drawing fewer pixels. ``None``: the interactor's ``DesiredUpdateRate``, as for VTK's "
         "own levels of detail; 0: every frame is full.",
         check=Number("a number of frames per second, 0 or above"),
-    )
-    adjust_multi_samples: bool = option(
-        True,
-        "go without multisampling while the view moves and frames would be late",
-        "At rest, and in pictures that are kept, it is as the plotter has it.",
-        setting=True,
     )
     regenerate: Policy = option(
         "auto",
@@ -183,9 +169,8 @@ class DrawingOptions(Options):
         "auto",
         "what is raycast where the volume is at hand",
         '``"auto"``: on the screen by what gives the better picture within ``target_fps``, the VDI '
-        "near its view and the volume far from it; off-screen the volume, until so many pictures "
-        "of nearly the same view are taken that a VDI costs less. Volumes that overlap are drawn "
-        "by VDIs. ``actor.status.drawn`` says what was drawn.",
+        "near its view and the volume far from it; off-screen the volume. Volumes that overlap are "
+        "drawn by VDIs. ``actor.status.drawn`` says what was drawn.",
     )
     coverage: Coverage = option(
         "bounds",

@@ -46,8 +46,6 @@ AnyVolume: TypeAlias = VolumeLike | NDArray[Any] | ShownLike
 LightsLike: TypeAlias = Union["Lights", VTKObject, "Sequence[Light | VTKObject]"]
 CroppingLike: TypeAlias = Union["Cropping", VTKObject, Sequence[float], Sequence[object]]
 OcclusionLike: TypeAlias = Union[bool, float, "AmbientOcclusion"]
-#: Bytes, or a text such as ``"2 GiB"``.
-MemoryLike: TypeAlias = float | str
 #: A name or an index of the list of devices, or a device in use.
 DeviceLike: TypeAlias = str | int | Any
 #: A client of a Dask cluster, or the address of its scheduler.

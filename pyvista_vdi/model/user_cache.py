@@ -28,10 +28,7 @@ def user_cache() -> Path | None:
 
 
 def writable_cache(name: str, author: str | None = None) -> Path:
-    """Return the user's cache folder of a program, which is made if it is not there.
-
-    Raises OSError if files cannot be made in it.
-    """
+    """Return the user's cache folder of a program, made if need be; OSError if it cannot be."""
     try:
         folder = Path(platformdirs.user_cache_dir(name, author or False))
     except RuntimeError as error:  # there is no home, and the system does not know the user

@@ -45,22 +45,19 @@ class Lists:
     depth_origin: float
     #: How it was made.
     metadata: dict[str, Any]
-
-    @property
-    def lists(self) -> Any:
-        """The lists in the form of a VDI, for storage: of a VDI itself."""
-        return self
+    #: The lists in the form of a VDI: of a VDI itself.
+    lists: VDI
 
     @property
     def arrays(self) -> Arrays:
-        """All arrays, in the order of :class:`VDI`'s arguments."""
-        found: Arrays = self.lists.arrays
-        return found
+        """All arrays, in the order of :class:`VDI`'s arguments; made now if they are not yet."""
+        return self.lists.arrays
 
     @property
     def offsets(self) -> NDArray[np.uint64]:
         """Where each list begins, uint64 (W * H + 1,); the last entry is their number n."""
-        return self.arrays.offsets
+        known = getattr(self.lists.late, "offsets", None)
+        return self.arrays.offsets if known is None else known
 
     @property
     def front(self) -> NDArray[np.float32]:
@@ -75,12 +72,23 @@ class Lists:
     @property
     def n_supersegments(self) -> int:
         """Number of supersegments in all lists."""
-        return int(self.offsets[-1])
+        known = getattr(self.lists.late, "n_supersegments", None)
+        return int(self.offsets[-1]) if known is None else known
 
     @property
     def counts(self) -> NDArray[np.int64]:
         """Supersegments per list, int64 (H, W), bottom row first."""
         return lengths_of_lists(self.offsets).reshape(self.window_size[::-1])
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays, with those of the packed form, or of what makes them when asked."""
+        return self.lists.nbytes
+
+    @property
+    def precision(self) -> str:
+        """What a supersegment takes on a device and in a file: see :meth:`VDI.with_precision`."""
+        return "exact" if self.lists.packing is None else "8-byte"
 
     @property
     def picture_size(self) -> tuple[int, int]:
@@ -90,6 +98,15 @@ class Lists:
         chosen them; else :attr:`window_size`.
         """
         return picture_size(self.window_size, self.metadata)
+
+    def equals(self, other: Any) -> bool:
+        """Whether all arrays, the view, the bounds and the range are the same to the last bit."""
+        names = ("camera", "window_size", "bounds", "depth_origin", "about")
+        return (
+            type(other) is type(self)
+            and all(getattr(self, n, None) == getattr(other, n, None) for n in names)
+            and all(map(np.array_equal, self.arrays, other.arrays))  # type: ignore[arg-type]
+        )
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write a file that `pyvista_vdi.read` opens: ``.vdi``, ``.html``, or ``.exr``.
@@ -144,10 +161,6 @@ class VDI(Lists):
 
     #: What makes the arrays when they are asked for, if they were not given; not public.
     late: LateArrays | None
-    #: The same where that is their 8-byte form, not public; ``None`` where they are exact.
-    packing: Packed8 | None
-    #: What is known of values that the lists keep in the place of colours; not public.
-    kept: Mapping[str, Any] | None
     _arrays: Arrays | None
 
     def __init__(
@@ -181,7 +194,7 @@ class VDI(Lists):
             _array("optical_depth", optical_depth, np.float32, ()),
         )
         _check(arrays, self.window_size, _nearest(self), origin)
-        self._arrays, self.late, self.packing, self.kept = _read_only(arrays), None, None, None
+        self._arrays, self.late = _read_only(arrays), None
 
     @property
     def arrays(self) -> Arrays:
@@ -192,16 +205,14 @@ class VDI(Lists):
         return self._arrays
 
     @property
-    def offsets(self) -> NDArray[np.uint64]:
-        """Where each list begins, uint64 (W * H + 1,); the last entry is their number n."""
-        known = getattr(self.late, "offsets", None)
-        return self.arrays.offsets if known is None else known
+    def lists(self) -> VDI:  # type: ignore[override]
+        """The lists in the form of a VDI: itself."""
+        return self
 
     @property
-    def n_supersegments(self) -> int:
-        """Number of supersegments in all lists."""
-        known = getattr(self.late, "n_supersegments", None)
-        return super().n_supersegments if known is None else known
+    def packing(self) -> Packed8 | None:
+        """The lists' 8-byte form, not public; ``None`` where they are exact."""
+        return self.late if isinstance(self.late, Packed8) else None
 
     @property
     def color(self) -> NDArray[np.float32]:
@@ -218,13 +229,7 @@ class VDI(Lists):
         """Bytes of all arrays, with those of the packed form, or of what makes them when asked."""
         if self._arrays is None:
             return getattr(self.late, "nbytes", 0)
-        packed = 0 if self.packing is None else self.packing.nbytes
-        return sum(array.nbytes for array in self._arrays) + packed
-
-    @property
-    def precision(self) -> str:
-        """What a supersegment takes on a device and in a file: see :meth:`with_precision`."""
-        return "exact" if self.packing is None else self.packing.precision
+        return sum(array.nbytes for array in self._arrays) + getattr(self.packing, "nbytes", 0)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and other processes are given: words of 8 bytes, or arrays."""
@@ -238,17 +243,6 @@ class VDI(Lists):
             raise IndexError(f"there is no pixel ({x!r}, {y!r}) in {width} x {height}")
         i = y * width + x
         return slice(int(self.offsets[i]), int(self.offsets[i + 1]))
-
-    def equals(self, other: VDI) -> bool:
-        """Whether all arrays, the view and the bounds are the same to the last bit."""
-        return (
-            isinstance(other, VDI)
-            and self.camera == other.camera
-            and self.window_size == other.window_size
-            and self.bounds == other.bounds
-            and self.depth_origin == other.depth_origin
-            and all(np.array_equal(getattr(self, n), getattr(other, n)) for n in Arrays._fields)
-        )
 
     def with_precision(self, precision: str) -> VDI:
         """Return the VDI with supersegments of fewer bytes, on devices and in ``.vdi`` files.
@@ -277,7 +271,7 @@ class VDI(Lists):
         if check_precision(precision) == self.precision:
             return self
         exact = precision == "exact"
-        return with_arrays(self, self.arrays if exact else packing_of(self.arrays, _nearest(self)))
+        return made_vdi(self.arrays if exact else packing_of(self.arrays, _nearest(self)), self)
 
     def __repr__(self) -> str:
         width, height = self.window_size
@@ -287,55 +281,19 @@ class VDI(Lists):
             f"{self.n_supersegments} supersegments, {self.nbytes / 2**20:.1f} MiB)"
         )
 
-    def plot(self, **arguments: Any) -> Any:
-        """Show it in a window, from its generating view.
 
-        Parameters
-        ----------
-        **arguments
-            Those of ``volume.vdi.plot``: ``pyvista.plot``'s and ``Plotter.show``'s
-            (``off_screen``, ``screenshot``, ``return_img``, ``cpos`` and so on); all others go to
-            ``Plotter.add_vdi``. Needs PyVista.
+def made_vdi(arrays: Arrays | LateArrays, like: Lists | None = None, **attributes: Any) -> VDI:
+    """Return a VDI of arrays that this package made, or of what makes them; nothing is checked.
 
-        Returns
-        -------
-        object
-            What ``Plotter.show`` returns.
-
-        Examples
-        --------
-        >>> import pyvista_vdi as pvdi
-        >>> pvdi.read("brain.vdi").plot()  # doctest: +SKIP
-        """
-        return registry.method("VDI.plot")(self, **arguments)
-
-
-def made_vdi(
-    camera: Camera,
-    window_size: tuple[int, int],
-    arrays: Arrays | LateArrays,
-    bounds: Bounds,
-    *,
-    depth_origin: float = 0.0,
-    metadata: Mapping[str, Any] | None = None,
-) -> VDI:
-    """Return a VDI of arrays that this package made, or of what makes them; nothing is checked."""
+    Attributes that are not given are those of ``like``.
+    """
     vdi = VDI.__new__(VDI)
-    vdi.camera, vdi.window_size, vdi.bounds = camera, window_size, bounds
-    vdi.depth_origin, vdi.metadata, vdi.kept = depth_origin, dict(metadata or {}), None
-    vdi._arrays, vdi.late = None, None
-    if isinstance(arrays, Arrays):
-        vdi._arrays = _read_only(arrays)
-    else:
-        vdi.late = arrays
-    vdi.packing = arrays if isinstance(arrays, Packed8) else None
+    for name in ("camera", "window_size", "bounds", "depth_origin", "metadata"):
+        setattr(vdi, name, attributes[name] if name in attributes else getattr(like, name))
+    vdi.metadata = dict(vdi.metadata)
+    exact = isinstance(arrays, Arrays)
+    vdi._arrays, vdi.late = (_read_only(arrays), None) if exact else (None, arrays)
     return vdi
-
-
-def with_arrays(vdi: Lists, arrays: Arrays | LateArrays, **changes: Any) -> VDI:
-    """Return a VDI that is like another but for its arrays, and changes of :func:`made_vdi`."""
-    names = ("camera", "window_size", "bounds", "depth_origin", "metadata")
-    return made_vdi(arrays=arrays, **{name: getattr(vdi, name) for name in names} | changes)
 
 
 def _nearest(vdi: VDI) -> float:
@@ -344,37 +302,32 @@ def _nearest(vdi: VDI) -> float:
 
 
 def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> NDArray[Any]:
+    """Return an array of a type, whose rows have a shape, or raise InvalidVDIError."""
     try:
-        array = np.asarray(values)
+        given = np.asarray(values)
     except (TypeError, ValueError) as error:  # lists of different lengths
         raise InvalidVDIError(f"{name} must be an array of numbers: {error}") from error
-    if array.dtype.kind not in "uif":
-        if array.size:
-            raise InvalidVDIError(
-                f"{name} must be numbers, in an array; got {reprlib.repr(values)}, of {array.dtype}"
-            )
-        array = np.zeros(array.shape, dtype)
-    counts = dtype is np.uint64 and array.size > 0
-    if counts and (array.dtype.kind == "f" or array.min() < 0):
+    if given.size == 0:
+        given = np.zeros((0, *item), dtype)
+    whole = given.dtype.kind == "u" or (given.dtype.kind == "i" and given.min() >= 0)
+    if given.dtype.kind not in "uif" or (dtype is np.uint64 and not whole):
+        kind = "whole numbers >= 0" if dtype is np.uint64 else "numbers"
         raise InvalidVDIError(
-            f"{name} must be whole numbers >= 0, of an integer type; got {array.min()} among "
-            f"numbers of {array.dtype}"
+            f"{name} must be {kind}, in an array; got {reprlib.repr(values)}, of {given.dtype}"
         )
-    with np.errstate(over="ignore"):  # infinite then: a rule refuses it, and says where
-        array = np.ascontiguousarray(array, dtype=dtype)
-    if array.size == 0 and item:
-        array = array.reshape((0, *item))
-    if array.ndim != 1 + len(item) or array.shape[1:] != item:
+    if given.ndim != 1 + len(item) or given.shape[1:] != item:
         wanted = f"(n, {item[0]})" if item else "(n,)"
-        raise InvalidVDIError(f"{name} must have shape {wanted}; got {array.shape}")
-    return array
+        raise InvalidVDIError(f"{name} must have shape {wanted}; got {given.shape}")
+    with np.errstate(over="ignore"):  # infinite then: a rule refuses it, and says where
+        return np.ascontiguousarray(given, dtype=dtype)
 
 
 def _read_only(arrays: Arrays) -> Arrays:
+    """Return views that cannot be written; the caller's own arrays stay writable."""
     given: Any = arrays
     views = Arrays(*map(np.ndarray.view, given))
     for view in views:
-        view.setflags(write=False)  # the caller's own stay writable
+        view.setflags(write=False)
     return views
 
 
@@ -407,36 +360,27 @@ def _check(arrays: Arrays, size: tuple[int, int], nearest: float, depth_origin: 
             f"{', '.join(f'{name} has {len(array)}' for name, array in lengths)} "
             "entries: give each as many"
         )
-
-    def require(good: Any, rule: str) -> None:
-        if good.all():
-            return
-        k = int(np.argmin(good))
-        i = int(np.searchsorted(offsets, k, side="right")) - 1
-        raise InvalidVDIError(
-            f"supersegment {k} (list {i}: pixel x={i % width}, y={i // width}) breaks the rule "
-            f"'{rule}': front {front[k]}, back {back[k]}, color {color[k]}, "
-            f"optical_depth {tau[k]}, depth_origin {depth_origin}"
-        )
-
-    if n == 0:
-        return
-    # Extremes need no array in between. Comparisons are written so that NaN fails each
-    if not (-np.inf < front.min() and back.max() < np.inf):
-        require(np.isfinite(front) & np.isfinite(back), "front and back finite")
-    require(front < back, "front < back")
-    if not (color.min() >= 0 and color.max() <= 1):
-        require(((color >= 0) & (color <= 1)).all(axis=1), "0 <= color <= 1")
-    if not (tau.min() >= 0 and tau.max() < np.inf):
-        require((tau >= 0) & np.isfinite(tau), "optical_depth >= 0 and finite")
-    if not front.min() >= np.float64(nearest):  # compared exactly
-        require(front >= np.float64(nearest), "in front of the eye (depth >= 0)")
+    # Check each supersegment. Comparisons are written so that NaN fails them
     ordered = np.ones(n, dtype=bool)
     np.less_equal(back[:-1], front[1:], out=ordered[1:])
-    # None is before a list's first. As int64, which NumPy takes as indices without a copy
-    starts = offsets[:-1].view(np.int64)
-    ordered[starts[: np.searchsorted(starts, n)]] = True
-    require(ordered, "sorted within its list and not overlapping")
+    starts = offsets[:-1].view(np.int64)  # which NumPy takes as indices without a copy
+    ordered[starts[: np.searchsorted(starts, n)]] = True  # none is before a list's first
+    for rule, good in {
+        "front and back finite": np.isfinite(front) & np.isfinite(back),
+        "front < back": front < back,
+        "0 <= color <= 1": ((color >= 0) & (color <= 1)).all(axis=1),
+        "optical_depth >= 0 and finite": (tau >= 0) & np.isfinite(tau),
+        "in front of the eye (depth >= 0)": front >= np.float64(nearest),  # compared exactly
+        "sorted within its list and not overlapping": ordered,
+    }.items():
+        if not good.all():
+            k = int(np.argmin(good))
+            i = int(np.searchsorted(offsets, k, side="right")) - 1
+            raise InvalidVDIError(
+                f"supersegment {k} (list {i}: pixel x={i % width}, y={i // width}) breaks the "
+                f"rule '{rule}': front {front[k]}, back {back[k]}, color {color[k]}, "
+                f"optical_depth {tau[k]}, depth_origin {depth_origin}"
+            )
 
 
 def lengths_of(lists: Lists) -> NDArray[np.float64]:

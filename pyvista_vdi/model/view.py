@@ -1,13 +1,33 @@
-"""A view on a screen, and how far two of them are apart."""
+"""Views of a box: the window that covers it, what of it they see, and how far two are apart."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.coverage import bounds_corners
+from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.volume import Grid
+
+#: Most lists that a covering view may have, as a multiple of the window's pixels.
+MAX_LISTS_PER_PIXEL = 4.0
+
+#: Least depth in front of the eye at which a corner can be projected, as a share of the diagonal
+#: of all corners; below it the rectangle on the screen has no useful size.
+_NEAREST = 1e-3
+
+#: A corner this little beyond a pixel's border, in pixels, does not need another row of lists.
+SLACK = 1e-6
+
+#: Rays along an edge of the window that tell what is seen, and by how much of V_O's window a point
+#: may lie outside of it by rounding.
+_RAYS, _COVERAGE_SLACK = 33, 1e-5
+
+#: Edges of a voxel that differ by less are the same.
+_COARSER = 1.01
 
 
 @dataclass(frozen=True)
@@ -27,19 +47,189 @@ class View:
         """
         if self == other:
             return 0.0
-        places = [view._pixels(bounds) for view in (self, other)]
-        if places[0] is None or places[1] is None:
-            return math.inf
-        apart = np.linalg.norm(places[0] - places[1], axis=1)
-        return float(apart.max()) / (self.size[1] / 2)
+        places = []
+        for camera, size in ((self.camera, self.size), (other.camera, other.size)):
+            pixels = projected(camera, size, bounds_corners(bounds))
+            if pixels is None:
+                return math.inf
+            places.append(pixels + (np.asarray(camera.window_center) - 1) / 2 * np.asarray(size))
+        return float(np.linalg.norm(places[0] - places[1], axis=1).max()) / (self.size[1] / 2)
 
-    def _pixels(self, bounds: tuple[float, ...]) -> NDArray[np.float64] | None:
-        """Return the corners' places in pixels from the centre ray, (8, 2); None behind the eye."""
-        camera = self.camera
-        corners = np.column_stack([bounds_corners(bounds), np.ones(8)])
-        x, y, z, _ = camera.model_to_view @ corners.T
-        per_unit = np.asarray(self.size) / 2 / camera.half_extent(self.size)
-        places = np.column_stack([x, y]) * per_unit
-        if camera.parallel_projection:
-            return places
-        return None if z.min() <= 0 else places / z[:, None]
+
+def covering_view(
+    camera: Camera,
+    window_size: Sequence[int],
+    corners: ArrayLike,
+) -> tuple[Camera, tuple[int, int]] | None:
+    """Move a view's window so that it covers a volume, and nothing else.
+
+    Eye, direction and the pixels' size and borders stay as they are on the screen; the window
+    becomes the smallest rectangle of whole pixels of that (unlimited) grid which contains the
+    projected corners. So V_N = V_O hits every list on its centre ray, and neither panning nor
+    zooming out shows a cut edge.
+
+    ``camera``: the view on the screen, with the model transform in it. ``window_size``: the
+    screen's width and height in pixels. ``corners`` (float, shape (n, 3)): points whose convex hull
+    contains the volume, model frame. Where the rectangle would need more lists than
+    :data:`MAX_LISTS_PER_PIXEL` times the window's pixels, they become larger than pixels, square as
+    before, and their borders no longer coincide. Returns: The view with its own window centre and
+    view angle (or parallel scale), and its window size. ``None`` if a corner is behind the eye or
+    closer than a thousandth of the corners' diagonal: no window can cover them. Raises
+    InvalidArgumentError if the window size is out of range.
+
+    With t the tangents of the half angles and c the window centre, the pixel rectangle [x0, x1) of
+    width w in a window of width W has t' = t w / W and c' t' = t (c + (x0 + x1) / W - 1); the same
+    in y, and with s for t in parallel projection (docs/dev/conventions.md#list-coordinates).
+    """
+    camera = Camera.from_any(camera)
+    size = np.asarray(check_window_size(window_size), dtype=np.float64)
+    pixels = projected(camera, window_size, np.asarray(corners, dtype=np.float64))
+    if pixels is None:
+        return None
+    low = np.floor(pixels.min(axis=0) + SLACK)
+    high = np.maximum(np.ceil(pixels.max(axis=0) - SLACK), low + 1)
+    # Take as many lists as allowed, each a square
+    extent, most = high - low, MAX_LISTS_PER_PIXEL * size.prod()
+    pitch = max(1.0, math.sqrt(extent.prod() / most), extent.max() / MAX_WINDOW_EDGE)
+    lists = np.ceil(extent / pitch - SLACK)
+    while not (lists.prod() <= most or (lists == 1).any()):
+        pitch *= 1.01  # rounding up both edges may pass the limit by less than two rows
+        lists = np.ceil(extent / pitch - SLACK)
+    grown = (lists * pitch - extent) / 2
+    low, high = low - grown, high + grown
+
+    half = np.asarray(camera.half_extent(window_size))
+    new_half = half * (high - low) / size
+    middle = half * (np.asarray(camera.window_center) + (low + high) / size - 1)
+    width, height = (int(n) for n in lists)
+    lens: dict[str, float] = {"parallel_scale": new_half[1]}
+    if not camera.parallel_projection:
+        angle = math.degrees(2 * math.atan(new_half[1]))
+        lens = {"view_angle": angle, "use_horizontal_view_angle": False}
+    return camera.replace(window_center=middle / new_half, **lens), (width, height)
+
+
+def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
+    """Return the share of a view's rays through the volume that the VDI has all of.
+
+    Below 1 a part of the volume that the view shows lies outside V_O's window, or behind V_O's eye.
+
+    ``vdi``: its camera and window say what it has. ``camera``: the new view V_N. ``window_size``:
+    width and height of its picture in pixels. Returns: 0 to 1, of the rays of :func:`_seen`; 1
+    where none of them meets the volume.
+
+    V_O's window and what lies before its eye are convex: they contain a part of a ray if they
+    contain its two ends.
+    """
+    to_lists = vdi.camera.viewport_matrix(vdi.window_size) @ vdi.camera.model_to_view
+    if _in_window(to_lists, bounds_corners(vdi.bounds)).all():  # as with coverage="bounds"
+        return 1.0
+    camera = Camera.from_any(camera)
+    near, far, _ = _seen(camera, window_size, camera.model_to_view, vdi.bounds)
+    if not len(near):
+        return 1.0
+    return float((_in_window(to_lists, near) & _in_window(to_lists, far)).mean())
+
+
+def nearest_depth(grid: Grid, camera: Camera, window_size: Sequence[int]) -> float | None:
+    """Return the view depth of the visible part of a grid's box that is nearest to the eye.
+
+    World units, 0 where the eye is in the box; ``None`` where nothing of it is in the window.
+    """
+    x, y, z = (n - 1 for n in grid.dimensions)
+    to_view = camera.model_to_view @ grid.index_to_model
+    depths = _seen(camera, window_size, to_view, (0, x, 0, y, 0, z))[2]
+    return max(0.0, float(depths.min())) if len(depths) else None
+
+
+def required_level(levels: Sequence[Grid], camera: Camera, window_size: Sequence[int]) -> int:
+    """Return the level of a multi-scale volume that a view requires.
+
+    It is the coarsest whose voxels are still as fine as half a list's width where the volume is
+    nearest to V_O: between the lists, what a finer one has more is hardly seen. Edges of voxels
+    count along the axes in which a level is coarser: many stores keep their few planes in all.
+
+    ``levels``: from the finest to the coarsest. ``camera``: V_O. ``window_size``: lists of V_O
+    along x and y.
+    """
+    depth = nearest_depth(levels[0], camera, window_size)
+    if depth is None:  # V_O sees nothing of the volume
+        return len(levels) - 1
+    width = min(2 * np.divide(camera.half_extent(window_size), window_size))
+    width *= 1.0 if camera.parallel_projection else depth
+    to_view = camera.model_to_view[:3, :3]
+    # Distances of neighbouring points along x, y and z, world units
+    edges = [np.linalg.norm(to_view @ each.index_to_model[:3, :3], axis=0) for each in levels]
+    fine = [now[now > _COARSER * edges[0]].max(initial=0) <= width / 2 for now in edges]
+    return fine.index(False) - 1 if False in fine else len(levels) - 1
+
+
+def _seen(
+    camera: Camera, window_size: Sequence[int], to_view: NDArray[np.float64], box: Sequence[float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return where rays of a view enter and leave a box, float64 (n, 3) each, and the depths first.
+
+    Of 33 x 33 rays that reach from edge to edge of the window, and of those through the corners of
+    the box, those that meet it before the eye. ``to_view`` leads from the box's coordinates to view
+    space.
+    """
+    u, v, _, w = camera.viewport_matrix(window_size) @ to_view @ _homogeneous(bounds_corners(box))
+    before = w > 0
+    across = np.linspace(-1.0, 1.0, _RAYS)
+    corners = np.stack([u[before], v[before]]) / w[before]
+    places = np.hstack([np.stack(np.meshgrid(across, across)).reshape(2, -1), corners])
+    places = places[:, (np.abs(places) <= 1).all(axis=0)]
+    # Points and directions in view space, taken to the box's coordinates
+    to_box = np.linalg.inv(to_view)
+    rays_of = np.vstack([np.ones(places.shape[1]), places]).T
+    origins, directions = (rays_of @ part for part in camera.ray_coefficients(window_size))
+    origins = (to_box @ _homogeneous(origins))[:3]
+    directions = to_box[:3, :3] @ directions.T
+    # The part of each that lies within the box, and before the eye
+    low, high = np.reshape(box, (3, 2)).T[:, :, np.newaxis]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.sort(np.stack([low - origins, high - origins]) / directions, axis=0)
+    ends = np.nan_to_num(ends, nan=0.0, posinf=np.inf, neginf=-np.inf)
+    first, last = ends[0].max(axis=0), ends[1].min(axis=0)
+    if not camera.parallel_projection:
+        first = np.maximum(first, 0.0)
+    meets = last > first
+    near, far = (origins[:, meets] + t[meets] * directions[:, meets] for t in (first, last))
+    return near.T, far.T, first[meets]
+
+
+def _in_window(to_window: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which points, (n, 3), a matrix puts in the window."""
+    u, v, _, w = to_window @ _homogeneous(points)
+    return np.asarray(np.maximum(np.abs(u), np.abs(v)) <= w + _COVERAGE_SLACK * np.abs(w).max())
+
+
+def _homogeneous(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.vstack([points.T, np.ones(len(points))])
+
+
+#: Which of the six numbers of bounds are x, y and z of each corner, int (3, 8).
+_CORNERS = np.array(np.meshgrid([0, 1], [2, 3], [4, 5])).reshape(3, 8)
+
+
+def bounds_corners(bounds: ArrayLike) -> NDArray[np.float64]:
+    """Return the eight corners of axis-aligned bounds (x0, x1, y0, y1, z0, z1), float64 (8, 3)."""
+    return np.asarray(bounds, dtype=np.float64)[_CORNERS].T
+
+
+def projected(
+    camera: Camera, window_size: Sequence[int], corners: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Return points in pixels from the window's lower left corner.
+
+    None if one is behind the eye or closer than a thousandth of all points' diagonal.
+    """
+    points = np.column_stack([corners, np.ones(len(corners))]) @ camera.model_to_view.T
+    if not camera.parallel_projection:
+        world = corners @ camera.model_transform[:3, :3].T
+        diagonal = float(np.linalg.norm(np.ptp(world, axis=0)))
+        if points[:, 2].min() <= _NEAREST * diagonal:
+            return None
+    viewport = points @ camera.viewport_matrix(window_size).T
+    uv = viewport[:, :2] / viewport[:, 3:]
+    return (uv + 1) / 2 * np.asarray(window_size)

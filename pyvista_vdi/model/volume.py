@@ -13,21 +13,30 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
 from pyvista_vdi.model.checks import as_floats, as_vector
-from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
+from pyvista_vdi.model.chunked import ChunkedArray, held, is_chunked
 from pyvista_vdi.model.host_memory import require_host_memory
 
 
-class Geometry:
-    """What follows from a uniform grid's points, spacing, origin and direction."""
+@dataclass(eq=False)
+class Grid:
+    """A uniform grid, without values.
 
+    ``dimensions``: points along x, y and z. ``spacing``, ``origin``: as of a :class:`Volume`, model
+    units. ``direction`` (float64 (3, 3)): columns are the directions of the index axes.
+    ``unit_distance``: the opacity unit distance by default, if not that of these points: a level of
+    a multi-scale store has the finest level's, so that all levels look the same; model units.
+    """
+
+    dimensions: tuple[int, int, int]
     spacing: tuple[float, float, float]
     origin: tuple[float, float, float]
     direction: NDArray[np.float64]
-    #: Number of points along x, y and z.
-    dimensions: tuple[int, int, int]
-    #: What the opacity unit distance is by default, if not that of these points: a level of a
-    #: multi-scale store has the finest level's, so that all levels look the same; model units.
     unit_distance: float | None = None
+
+    @classmethod
+    def of(cls, grid: Grid) -> Grid:
+        """Return the grid of a volume."""
+        return cls(grid.dimensions, grid.spacing, grid.origin, grid.direction, grid.unit_distance)
 
     @functools.cached_property
     def index_to_model(self) -> NDArray[np.float64]:
@@ -61,56 +70,7 @@ class Geometry:
         return self.length / (float(np.mean(self.dimensions)) - 1)
 
 
-@dataclass(frozen=True)
-class Grid(Geometry):
-    """A uniform grid without its values.
-
-    ``dimensions``: points along x, y and z. ``spacing``, ``origin``: as of a
-    :class:`~pyvista_vdi.model.volume.Volume`, model units. ``direction`` (float64 (3, 3)): columns
-    are the directions of the index axes. ``unit_distance``: in place of
-    :attr:`default_unit_distance`.
-    """
-
-    dimensions: tuple[int, int, int]
-    spacing: tuple[float, float, float]
-    origin: tuple[float, float, float]
-    direction: NDArray[np.float64]
-    unit_distance: float | None = None
-
-    @classmethod
-    def of(cls, geometry: Geometry) -> Grid:
-        """Return the grid of a volume."""
-        return cls(
-            geometry.dimensions,
-            geometry.spacing,
-            geometry.origin,
-            geometry.direction,
-            geometry.unit_distance,
-        )
-
-
-#: Voxel types that the kernels read as they are.
-VOXEL_TYPES: tuple[str, ...] = (
-    "uint8",
-    "int8",
-    "uint16",
-    "int16",
-    "uint32",
-    "int32",
-    "float32",
-    "float64",
-)
-
-#: Attributes by which arrays in files say that their values are others than those that are stored.
-_PACKING = ("scale_factor", "add_offset", "_Unsigned")
-#: Attributes with numbers that stand for nothing, and what xarray writes for NaN in zarr 3.
-_MISSING, _NAN = ("_FillValue", "missing_value"), "AAAAAAAA+H8="
-
-#: Types that one of those represents without loss for every value they can hold.
-_WIDENED = {"bool": "uint8", "float16": "float32"}
-
-
-class Volume(Geometry):
+class Volume(Grid):
     """Scalars, or colours with opacity, at the points of a uniform grid.
 
     The grid's model coordinates are ``origin + direction @ (spacing * (x, y, z))`` for the point
@@ -132,7 +92,7 @@ class Volume(Geometry):
         Columns are the directions of the x, y and z index axes; identity by default.
     name : str
         What the scalars are called.
-    blanked : array_like of uint8, shape (nz, ny, nx), optional
+    blanked : numpy.ndarray of uint8, shape (nz, ny, nx), optional
         What is not drawn: a bit for each octant, half a voxel long, around each point. The
         octant above the point along x has 1 in its number, that above it along y 2, along z 4.
 
@@ -143,8 +103,11 @@ class Volume(Geometry):
         the grid is not finite, positive and invertible.
     """
 
-    array: NDArray[Any]
     name: str
+    #: Whether every point has a colour of its own; the scalar is the fourth component then.
+    rgba: bool
+    #: Whether the voxels are read chunk by chunk: VDIs are then made block by block.
+    chunked: bool
     #: Of lengths, where a file says it.
     unit: str = ""
     blanked: NDArray[np.uint8] | None
@@ -157,30 +120,53 @@ class Volume(Geometry):
         direction: ArrayLike | None = None,
         *,
         name: str = "values",
-        blanked: ArrayLike | None = None,
+        blanked: NDArray[np.uint8] | None = None,
     ) -> None:
-        self.array = chunked_array(array) if is_chunked(array) else _checked_array(array)
+        if isinstance(array, ChunkedArray):
+            self.array: Any = array
+        else:
+            self.array = ChunkedArray(array) if is_chunked(array) else _checked_array(array)
+        self.chunked = isinstance(self.array, ChunkedArray)
+        self.rgba = self.array.ndim == 4
         nz, ny, nx = self.array.shape[:3]
+        if min(nx, ny, nz) < 2:
+            raise InvalidVolumeError(
+                "the volume has only one plane of points, or none: its shape is "
+                f"{self.array.shape[:3]} (z, y, x), and a volume needs at least two points along "
+                "each axis"
+            )
         self.dimensions = nx, ny, nz
         self.spacing = as_vector(spacing, "spacing", error=InvalidVolumeError)
         self.origin = as_vector(origin, "origin", error=InvalidVolumeError)
         matrix = np.eye(3) if direction is None else as_floats(direction)
-        if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
-            raise InvalidVolumeError(f"direction must be 3 x 3 finite numbers; got {direction!r}")
-        if abs(np.linalg.det(matrix)) < 1e-9:
+        finite = matrix.shape == (3, 3) and np.isfinite(matrix).all()
+        if not finite or abs(np.linalg.det(matrix)) < 1e-9:
             raise InvalidVolumeError(
-                f"the direction matrix {matrix.tolist()} cannot be inverted: its columns must be "
-                "three independent directions"
+                "direction must be 3 x 3 finite numbers, three independent directions as columns; "
+                f"got {direction!r}"
             )
         matrix.setflags(write=False)
         self.direction = matrix
-        self.name = str(name)
-        self.blanked = None if blanked is None else self._checked_blanked(blanked)
+        self.name, self.blanked = str(name), blanked
         if min(self.spacing) <= 0:
             raise InvalidVolumeError(
                 f"spacing must be positive along each axis; got {self.spacing}: "
                 "flip the array (or the direction matrix) instead of a negative spacing"
             )
+        if blanked is None:
+            return
+        if self.chunked:
+            raise UnsupportedError(
+                "blanked is of volumes in memory, and this one is read chunk by chunk: load it "
+                "(Volume.load()), or write NaN where it is blank"
+            )
+        kind, shape = getattr(blanked, "dtype", type(blanked)), getattr(blanked, "shape", ())
+        if kind != np.uint8 or shape != self.array.shape[:3]:
+            raise InvalidVolumeError(
+                f"blanked must be uint8 of shape {self.array.shape[:3]}, a bit for each octant; "
+                f"got {kind} of shape {shape}"
+            )
+        self.blanked = np.ascontiguousarray(blanked)
 
     @staticmethod
     def from_vtk(image: Any, scalars: str | None = None, preference: str = "point") -> Volume:
@@ -211,51 +197,11 @@ class Volume(Geometry):
         from_vtk = registry.method("Volume.from_vtk")
         return from_vtk(image, scalars, preference)  # type: ignore[no-any-return]
 
-    @property
-    def rgba(self) -> bool:
-        """Whether every point has a colour of its own; the scalar is the fourth component then."""
-        return self.array.ndim == 4
-
-    @property
-    def chunks(self) -> ChunkedArray | None:
-        """What reads the voxels chunk by chunk; ``None`` where they are in memory."""
-        array: Any = self.array
-        return array if isinstance(array, ChunkedArray) else None
-
-    @property
-    def chunked(self) -> bool:
-        """Whether the voxels are read chunk by chunk: VDIs are then made block by block."""
-        return self.chunks is not None
-
-    def _checked_blanked(self, blanked: ArrayLike) -> NDArray[np.uint8]:
-        try:
-            octants = np.ascontiguousarray(blanked)
-        except ValueError:  # lists of several lengths
-            octants = np.empty(0)
-        if self.chunked:
-            raise UnsupportedError(
-                "blanked is of volumes in memory, and this one is read chunk by chunk: load it "
-                "(Volume.load()), or write NaN where it is blank"
-            )
-        if octants.dtype != np.uint8 or octants.shape != self.array.shape[:3]:
-            raise InvalidVolumeError(
-                f"blanked must be uint8 of shape {self.array.shape[:3]}, a bit for each octant; "
-                f"got {octants.dtype} of shape {octants.shape}"
-            )
-        return octants
-
-    def load(self) -> Volume:
-        """Return the volume with all its voxels in memory."""
-        array = self.array[:, :, :] if self.chunked else self.array
-        loaded = Volume(array, self.spacing, self.origin, self.direction, name=self.name)
-        loaded.unit_distance, loaded.unit = self.unit_distance, self.unit
-        return loaded
-
     def in_view(self, *cameras: Any, window_size: Sequence[int]) -> Volume:
         """Return what of several levels these views require: of one, itself."""
         return self
 
-    def load_in_view(self, *cameras: Any, window_size: Sequence[int]) -> Volume:
+    def load(self, *cameras: Any, window_size: Sequence[int] = (1, 1)) -> Volume:
         """Return the volume in memory, of several levels the one that views require.
 
         Raises
@@ -263,12 +209,15 @@ class Volume(Geometry):
         DeviceMemoryError
             If it is read chunk by chunk, and the host has not so much memory free.
         """
-        if not self.chunked:
-            return self
-        found = self.in_view(*cameras, window_size=window_size)
-        what = f"the volume {found.name}"
-        require_host_memory(found.array.nbytes, what, "open a coarser level (level=...)", free=True)
-        return found.load()
+        found = self.in_view(*cameras, window_size=window_size) if cameras else self
+        if not found.chunked:
+            return found
+        remedy = "open a coarser level (level=..., --level), or generate a VDI, block by block"
+        require_host_memory(found.array.nbytes, f"the volume {found.name}", remedy, free=True)
+        array = found.array[:, :, :]
+        loaded = Volume(array, found.spacing, found.origin, found.direction, name=found.name)
+        loaded.unit_distance, loaded.unit = found.unit_distance, found.unit
+        return loaded
 
     @property
     def scalars(self) -> NDArray[np.generic]:
@@ -293,8 +242,8 @@ class Volume(Geometry):
 
     @functools.cached_property
     def _range(self) -> tuple[float, float]:
-        if self.chunks is not None:
-            return self.chunks.ends
+        if self.chunked:
+            return self.array.ends  # type: ignore[no-any-return]
         if self.array.dtype.kind != "f":
             return float(self.scalars.min()), float(self.scalars.max())
         low, high = np.fmin.reduce(self.array, axis=None), np.fmax.reduce(self.array, axis=None)
@@ -306,55 +255,6 @@ class Volume(Geometry):
         return f"Volume({nx} x {ny} x {nz} {kind}, spacing={self.spacing})"
 
 
-def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any:
-    """Return an array that is read chunk by chunk, as a volume holds it; nothing is read yet.
-
-    ``index`` says what is taken of an array of more dimensions, as of a :class:`ChunkedArray`.
-    Values that its attributes pack, as the CF conventions have it, are refused.
-    """
-    if isinstance(array, ChunkedArray):
-        return array
-    attributes = getattr(array, "attrs", {})
-    said = [name for name in _PACKING if name in attributes]
-    said += [name for name in _MISSING if name in attributes and not _is_nan(attributes[name])]
-    if said:
-        raise InvalidVolumeError(
-            f"the array's values are packed ({', '.join(said)}): open it by xarray, which unpacks "
-            'them, and give pyvista_vdi.Volume(dataset["name"].data)'
-        )
-    kind, long = _voxel_type(array.dtype)
-    checked = _from_long_integers if long else None
-    found = ChunkedArray(array, index=index, checked=checked, dtype=kind)
-    _check_planes(found.shape)
-    return found
-
-
-def _is_nan(said: Any) -> bool:
-    return said == _NAN if isinstance(said, str) else bool(np.isnan(as_floats(said)).all())
-
-
-def _check_planes(shape: tuple[int, ...]) -> None:
-    if min(shape[:3]) < 2:
-        raise InvalidVolumeError(
-            f"the volume has only one plane of points: its shape is {shape[:3]} (z, y, x), "
-            "and a volume needs at least two points along each axis"
-        )
-
-
-def _voxel_type(dtype: Any) -> tuple[str, bool]:
-    """Return the type that voxels of a type are held as, and whether those are 64-bit integers."""
-    kind = np.dtype(dtype).newbyteorder("=").name
-    if kind in ("int64", "uint64"):
-        return "float64", True
-    kind = _WIDENED.get(kind, kind)
-    if kind not in VOXEL_TYPES:
-        known = ", ".join(VOXEL_TYPES)
-        raise InvalidVolumeError(
-            f"voxels of type {dtype} are not supported: convert to one of {known}"
-        )
-    return kind, False
-
-
 def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
     try:
         array = np.asarray(values)
@@ -362,26 +262,8 @@ def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
         raise InvalidVolumeError(f"a volume is an array of numbers: {error}") from error
     rgba = array.ndim == 4 and array.shape[-1] == 4 and array.dtype == np.uint8
     if array.ndim != 3 and not rgba:
-        hint = (
-            ": give one scalar per point, indexed [z, y, x], or RGBA as four uint8"
-            if array.ndim == 4
-            else ""
-        )
         raise InvalidVolumeError(
-            f"a volume is a three-dimensional array; got shape {array.shape}{hint}"
+            "a volume is a three-dimensional array, one scalar per point, indexed [z, y, x], or "
+            f"RGBA as four uint8 per point; got shape {array.shape}"
         )
-    if array.size == 0:
-        raise InvalidVolumeError(f"the volume is empty: its shape is {array.shape}")
-    _check_planes(array.shape)
-    kind, long = _voxel_type(array.dtype)
-    return _from_long_integers(array) if long else np.ascontiguousarray(array, dtype=kind)
-
-
-def _from_long_integers(array: NDArray[np.generic]) -> NDArray[np.generic]:
-    widest = max(abs(int(array.min())), abs(int(array.max())))
-    if widest > 2**53:
-        raise InvalidVolumeError(
-            f"voxels of type {array.dtype} hold values up to {widest}, which float64 cannot "
-            "represent exactly: scale them, or convert them yourself"
-        )
-    return np.ascontiguousarray(array, dtype=np.float64)
+    return held(array)

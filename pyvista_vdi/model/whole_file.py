@@ -22,8 +22,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     VDIFileError if the target cannot be written; when the block is entered, or when the disk is
     full.
     """
-    target = _resolved_target(path)
-    temporary, stream = _open_beside(target)
+    target, temporary, stream = _begun(path)
     try:
         with stream:
             yield stream
@@ -35,18 +34,13 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     except BaseException as error:
         temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise VDIFileError(f"{target} could not be written: {_reason(error)}") from error
+            raise VDIFileError(f"{target} could not be written: {error.strerror}") from error
         raise
 
 
 def check_writable(path: str | os.PathLike[str]) -> Path:
-    """Raise now if ``path`` could not be written later; nothing is left behind.
-
-    ``path``: a target to be written after long work. Returns: The target, links followed. Raises
-    VDIFileError if its folder is absent or cannot be written, or a folder or device has its name.
-    """
-    target = _resolved_target(path)
-    temporary, stream = _open_beside(target)
+    """Return a target, links followed; VDIFileError now if it could not be written later."""
+    target, temporary, stream = _begun(path)
     stream.close()
     temporary.unlink()
     return target
@@ -71,33 +65,17 @@ def with_suffix(target: Path, suffixes: tuple[str, ...], kind: str) -> Path:
     return target
 
 
-def _resolved_target(path: str | os.PathLike[str]) -> Path:
+def _begun(path: str | os.PathLike[str]) -> tuple[Path, Path, BinaryIO]:
+    """Return a target, links followed, and a new file in its folder: moving it is one step."""
     try:
         target = Path(os.path.realpath(path))
-        exists, regular, has_folder = target.exists(), target.is_file(), target.parent.is_dir()
-    except (OSError, ValueError) as error:  # a name that is too long, or holds a null character
-        raise VDIFileError(f"{os.fspath(path)!r} cannot be written: {_reason(error)}") from error
-    if exists and not regular:
-        kind = "a folder" if target.is_dir() else "not a regular file"
-        raise VDIFileError(f"{target} cannot be written: it is {kind}; choose another name")
-    if not has_folder:
-        raise VDIFileError(
-            f"{target} cannot be written: the folder {target.parent} does not exist; create it"
-        )
-    return target
-
-
-def _open_beside(target: Path) -> tuple[Path, BinaryIO]:
-    """Create a new file in the target's folder, so that moving it later is one step."""
-    # Shortened: the temporary name may not be longer than the folder's file system allows
-    temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
-    try:
-        return temporary, temporary.open("x+b")
-    except OSError as error:
-        raise VDIFileError(
-            f"{target} cannot be written: {_reason(error)}; choose another folder"
-        ) from error
-
-
-def _reason(error: Exception) -> str:
-    return str(getattr(error, "strerror", None) or error)
+        if target.exists() and not target.is_file():
+            raise OSError(0, "it is a folder, or not a regular file; choose another name")
+        if not target.parent.is_dir():
+            raise OSError(0, f"the folder {target.parent} does not exist; create it")
+        # Shortened: the temporary name may not be longer than the folder's file system allows
+        temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
+        return target, temporary, temporary.open("x+b")
+    except (OSError, ValueError) as error:  # a name that holds a null character, say
+        why = getattr(error, "strerror", None) or error
+        raise VDIFileError(f"{os.fspath(path)} cannot be written: {why}") from error

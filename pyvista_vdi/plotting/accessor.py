@@ -136,11 +136,6 @@ class VDIAccessor:
             raise
 
 
-def plot(shown: Any, **arguments: Any) -> Any:
-    """Show what ``add_vdi`` takes in a window of its own; see :meth:`VDIAccessor.plot`."""
-    return VDIAccessor(shown).plot(**arguments)
-
-
 def _taken(arguments: dict[str, Any], function: Any, *more: str) -> dict[str, Any]:
     """Take those of the arguments that are a function's own, and return them."""
     own = {*inspect.signature(function).parameters, *more}

@@ -12,10 +12,7 @@ from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image
 from pyvista_vdi.vtk_pipeline.filters.view import framed
-from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkCamera, vtkImageData
-
-# PYVISTA_VTK_BACKEND may have changed between our first use of VTK and PyVista's
-require_this_build(Volume)
+from pyvista_vdi.vtk_pipeline.vtk import vtkCamera, vtkImageData
 
 
 class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):

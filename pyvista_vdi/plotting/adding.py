@@ -12,6 +12,7 @@ from typing import Any, ClassVar, NamedTuple, get_type_hints
 import numpy as np
 import pyvista as pv
 
+from pyvista_vdi.api import generate
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import (
     InvalidArgumentTypeError,
@@ -49,7 +50,7 @@ from pyvista_vdi.quality.targets import refuse_settings
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-from pyvista_vdi.vtk_pipeline.filters.view import aim, as_array
+from pyvista_vdi.vtk_pipeline.filters.view import View, aim, as_array
 from pyvista_vdi.vtk_pipeline.vtk import vtkMultiBlockDataSet
 
 #: ``add_volume``'s names of VTK's mappers.
@@ -313,7 +314,6 @@ def _of_values(shown: DeferredVDI, asked: Addition) -> _Shown:
 def _of_late_values(volume: Any, asked: Addition) -> _Shown:
     """Return the values of a volume, which the first picture has made for its view."""
     asked.deferral.refuse_target(asked.target)
-    _refuse_of_values(asked.look)
     fixed = {"coverage": asked.drawing.coverage != "bounds", "draw": asked.drawing.draw == "volume"}
     refused = " and ".join(each for each, given in fixed.items() if given)
     if refused:
@@ -323,12 +323,17 @@ def _of_late_values(volume: Any, asked: Addition) -> _Shown:
             "classification"
         )
     source = _source(volume, asked)
-    source.SetDeferral("deferred", asked.deferral.value_range)
-    source.SetVolumeProperty(pv.VolumeProperty(interpolation_type=asked.look.interpolation))
     volume = source.GetVolume()
     ends = kept_range(volume, asked.options, asked.deferral)
+    told = {"device": source.GetDevice(), "interpolation": asked.look.interpolation}
+    told |= {"progress": source.GetProgressCallback(), **asked.options.given}
+
+    def made(view: View) -> DeferredVDI:
+        return generate(volume, view.camera, view.size, **told, **asked.deferral.given)
+
     plain = replace(asked, look=replace(asked.look, interpolation="nearest"))
-    return _values_shown(source, plain, ends, volume.default_unit_distance, volume.name)
+    what = (ends, volume.default_unit_distance, volume.name)
+    return _values_shown(made, plain, *what, volume.bounds, source.GetCamera())
 
 
 def _refuse_of_values(look: Looks) -> None:
@@ -345,19 +350,20 @@ def _refuse_of_values(look: Looks) -> None:
 
 
 def _values_shown(
-    values: DeferredVDI | VDISource,
+    values: DeferredVDI | Callable[[View], DeferredVDI],
     asked: Addition,
     value_range: tuple[float, float],
     unit_distance: float,
     title: str,
+    *late: Any,
 ) -> _Shown:
     """Return values with the property that classifies them, as ``add_volume`` makes it."""
     look = asked.look
     _refuse_of_values(look)
     table = look.lookup_table(np.array(value_range))
     prop = look.volume_property(table, unit_distance)
-    bar = asked.place.show_scalar_bar
-    return _Shown(DeferredInput(values, prop), table, table.scalar_range, title, prop, bar)
+    shown = DeferredInput(values, prop, *late)
+    return _Shown(shown, table, table.scalar_range, title, prop, asked.place.show_scalar_bar)
 
 
 def _of_volume(volume: Any, asked: Addition, plotter: Any) -> _Shown:
@@ -414,7 +420,6 @@ def _mapper(shown: _Shown, asked: Addition, theme: Any) -> Any:
     mapper.lookup_table = shown.table
     mapper.SetDevice(asked.making.device)
     mapper.SetTargetFrameRate(drawing.target_fps)
-    mapper.SetAutoAdjustMultiSamples(drawing.adjust_multi_samples)
     mapper.SetRegenerate(drawing.regenerate)
     mapper.SetRegenerateBelow(below)
     mapper.SetDraw(drawing.draw)

@@ -60,8 +60,8 @@ class AddVDI(Component):
             A uniform grid, or a rectilinear one of equidistant points; a NumPy array as
             ``add_volume`` takes it; blocks of uniform grids; a file, or a store, of which the level
             that the view requires is shown. Or a VDI, also as
-            ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which plays
-            (``actor.play()``, ``actor.time``), or a :class:`VDISet`, of which the nearest to the
+            ``pyvista.read("x.vdi")`` gives it, a :class:`VDISeries`, which ``actor.player``
+            plays, or a :class:`VDISet`, of which the nearest to the
             view is drawn. With VDIs nothing is generated, arguments that only a volume can honour
             are refused, and where nobody has set the camera, the plotter opens from the VDI's own
             view. A :class:`DeferredVDI`, or a series or a set of such, takes a look (``cmap``,

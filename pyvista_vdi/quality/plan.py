@@ -8,7 +8,7 @@ picture.
 
 from __future__ import annotations
 
-import math
+from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -30,27 +30,18 @@ _ANOTHER_ESTIMATE = 0.005
 #: Pixels as wide as one list from which on a VDI without its volume is said to be too coarse, and
 #: the share of rays below which it is said to cover too little: corners of bounds are often empty.
 _TOO_COARSE, _TOO_LITTLE = 2.0, 0.9
-#: Least SSIM of a VDI's picture against the volume's for the VDI to be drawn where the volume is at
-#: hand, and by what share the contrast within 4 x 4 pixels may differ, where nobody said otherwise.
-SIMILAR, _SAME_CONTRAST = 0.98, 0.1
+#: Least SSIM of a VDI's picture against the volume's for the VDI to be drawn at rest where the
+#: volume is at hand, where nobody said otherwise.
+SIMILAR = 0.98
 #: Pixels as wide as one list from which on a picture has less detail than its pixels could show.
 FINE_ENOUGH = 1.25
-#: Degrees from the VDI's view beyond which the volume's picture takes no longer than its own.
-_FASTER_WITHIN = 10.0
-#: Estimates that are remembered.
-_ESTIMATES = 64
-#: Rays that an estimate casts, 16 tiles of 24 x 24 by the VDI and by the volume: a VDI of no more
-#: pixels takes no longer to be made.
-_JUDGED = 2 * 16 * 24**2
-#: An estimate holds for pictures of views as near as this to its own (about radians).
-_ANOTHER_JUDGEMENT = 0.02
 
 
 @dataclass(frozen=True)
 class Made:
     """A VDI that is there, as a view shows it; see :mod:`pyvista_vdi.quality.view_error`."""
 
-    number: int  # by which it is known
+    known: Hashable  # by what: a weak reference to it
     bounds: tuple[float, ...]  # of the volume, model frame
     content: Any = None  # of what it was made, and for which view
     screen: Any = None
@@ -58,67 +49,15 @@ class Made:
     magnification: float = 1.0
     coverage: float = 1.0
     pixels: float = 0.0  # in which it may be seen
-    options: Any = None  # how it is drawn (clipping planes in world coordinates), compared by ==
 
 
 @dataclass(frozen=True)
 class ViewEstimate:
     """What the SSIM of a VDI's picture was found to be."""
 
-    vdi: int
+    vdi: Any  # by what it is known
     view: View
     ssim: float
-    contrast: float = 1.0
-    options: Any = None
-
-
-@dataclass(frozen=True)
-class Pictures:
-    """What pictures that are kept have told; it is the same in every run."""
-
-    vdi: int | None = None  # of which the estimates are
-    judged: tuple[ViewEstimate, ...] = ()
-    poor_from: float = math.inf  # degrees, of the nearest view that the VDI fails
-
-    def serves(
-        self,
-        made: Made,
-        view: View,
-        judged: ViewEstimate | Literal[False] | None,
-        bound: float | None,
-        *,
-        joint: bool,
-        alone: bool,
-    ) -> tuple[Pictures, bool | None]:
-        """Return whether a VDI's picture of a view does; ``None`` where an estimate has to tell.
-
-        ``judged`` is what that has told, ``alone`` whether a VDI of this very view would be kept.
-        """
-        known = self
-        if known.vdi != made.number:
-            known = replace(known, vdi=made.number, judged=(), poor_from=math.inf)
-        if bound is None and made.magnification > FINE_ENOUGH:
-            return known, False
-        # What fails near the generating view fails farther away: the loss comes at once
-        within = 180.0 if joint else _FASTER_WITHIN
-        if made.angle > within or made.angle >= known.poor_from or made.coverage < 1:
-            return known, False
-        at_home = made.screen == view
-        if judged is False or (joint and alone and not at_home and made.pixels <= _JUDGED):
-            return known, False
-        if judged is not None and judged not in known.judged:
-            known = replace(known, judged=(*known.judged[1 - _ESTIMATES :], judged))
-        same = [each for each in known.judged if each.options == made.options]
-        apart = [view.distance(each.view, made.bounds) for each in same]
-        if not apart or min(apart) > _ANOTHER_JUDGEMENT:
-            return known, None
-        error = same[apart.index(min(apart))]
-        does = error.ssim >= (SIMILAR if bound is None else bound)
-        if bound is None:
-            does = does and abs(error.contrast - 1) <= _SAME_CONTRAST
-        if not does and made.magnification <= FINE_ENOUGH:
-            known = replace(known, poor_from=made.angle)
-        return known, does
 
 
 @dataclass(frozen=True)
@@ -154,19 +93,16 @@ class Seen:
     one_view: bool = True  # whether no other renderer or mapper shows the VDI
     joint: bool = False  # whether another volume overlaps it in the picture
     first_look: bool = True  # whether it is a whole picture that was not looked at before
-    own_pixels: bool = True  # whether its pixels are the view's
     # What there is
     made: Made | None = None  # the VDI made last, as the view shows it
     making: Making | None = None
     estimating: bool = False
     estimate: ViewEstimate | None = None  # the last one made in the background
-    judged: ViewEstimate | Literal[False] | None = None  # of this very frame; False: none can be
     failed: bool = False  # whether making a VDI has failed, and nothing has changed since
     volume: Literal["whole", "bricks", "none"] = "whole"  # how the device can draw it
     late: bool = False  # whether the volume's own full frames miss the rate
     seconds: float | None = None  # what the rays of a frame of a motion may take
     costs: Costs = field(default_factory=Costs)
-    pictures: Pictures = field(default_factory=Pictures)
 
     @property
     def stale(self) -> bool:
@@ -187,13 +123,12 @@ class Plan:
     in_bricks: bool = False  # whether the volume may be drawn brick by brick
     full: bool = True  # whether every pixel gets a ray
     stand_in: bool = False  # whether the volume stands in for a VDI to come
-    view: Literal["take", "follow"] | None = None  # make the next VDI of this frame's view
+    follow: bool = False  # make the next VDI of this frame's view
     update: bool = False  # make the VDI now
     give_up: bool = False  # what is being made
     make: View | None = None  # a VDI in the background, for this view
-    estimate: Literal["now", "background"] | None = None  # the VDI's error; "now": and ask again
+    estimate: bool = False  # the VDI's error in the background
     costs: Costs = field(default_factory=Costs)
-    pictures: Pictures = field(default_factory=Pictures)
 
 
 def plan(seen: Seen) -> Plan:
@@ -201,7 +136,7 @@ def plan(seen: Seen) -> Plan:
     if seen.draw == "volume" and not seen.joint and seen.volume == "whole":
         show: Any = "trouble" if seen.content is None else "volume"
         give_up = seen.making is not None
-        return _planned(seen, show, seen.content, view=_follow(seen), give_up=give_up)
+        return _planned(seen, show, seen.content, follow=_follow(seen), give_up=give_up)
     return _watched(seen) if seen.watched else _kept(seen)
 
 
@@ -225,7 +160,7 @@ def _watched(seen: Seen) -> Plan:
         asked_for or seen.late or seen.volume != "whole"
     ):
         make = _view_to_make(seen)
-    estimate: Any = "background" if make is None and not serves and _unknown(seen) else None
+    estimate = make is None and not serves and _unknown(seen)
     rest: dict[str, Any] = {"give_up": making is not None and not serves, "make": make}
     rest |= {"estimate": estimate}
     # Show the volume where there is no VDI of what there is now, and else what is better in time
@@ -248,48 +183,31 @@ def _watched(seen: Seen) -> Plan:
 def _kept(seen: Seen) -> Plan:
     """Plan a picture that is kept, the same in every run: told by the view, never by time.
 
-    A VDI is drawn where it has all that the view shows, at its detail, and where an estimate says
-    that the picture is like the volume's.
+    It is the volume's, which is right from every view. Volumes that overlap are merged by the lists
+    of VDIs, each of exactly the view.
     """
-    made, again = seen.made, not seen.failed
+    made, again, follow = seen.made, not seen.failed, _follow(seen)
     if seen.draw == "vdi":
-        view = None if made is None else _follow(seen)
-        return _planned(seen, "vdi", view=view, update=again)
+        return _planned(seen, "vdi", follow=follow, update=again)
     if seen.content is None:
         return _planned(seen, "trouble")
-    pictures = seen.pictures
-    if made is not None and not seen.stale:
-        pictures, does = pictures.serves(
-            made,
-            seen.view,
-            seen.judged,
-            seen.bound,
-            joint=seen.joint,
-            alone=seen.one_view and seen.own_pixels,
-        )
-        if does is None:
-            return _planned(seen, "vdi", estimate="now", pictures=pictures)
-        if does:
-            return _planned(seen, "vdi", pictures=pictures)
-    auto, follow = seen.regenerate == "auto", _follow(seen)
-    by_vdi = _planned(seen, "vdi", view=follow, update=again, pictures=pictures)
-    if seen.joint:  # merged by the lists of VDIs
-        return _planned(seen, "exact", view=follow, pictures=pictures) if auto else by_vdi
-    if seen.volume == "none":
-        return by_vdi
-    of = seen.content
-    return _planned(seen, "volume", of, view=follow, in_bricks=True, pictures=pictures)
+    if seen.joint and seen.regenerate == "auto":
+        own = made is not None and not seen.stale and made.screen == seen.view
+        return _planned(seen, "vdi" if own else "exact", follow=follow)
+    if seen.joint or seen.volume == "none":
+        return _planned(seen, "vdi", follow=follow, update=again)
+    return _planned(seen, "volume", seen.content, follow=follow, in_bricks=True)
 
 
 def _planned(seen: Seen, show: Any, content: Any = None, **more: Any) -> Plan:
-    known = {"costs": seen.costs, "pictures": seen.pictures, **more}
-    return Plan(show, content, full=not (seen.moving or more.get("stand_in")), **known)
+    full = not (seen.moving or more.get("stand_in"))
+    return Plan(show, content, full=full, **{"costs": seen.costs, **more})
 
 
-def _follow(seen: Seen) -> Literal["follow"] | None:
+def _follow(seen: Seen) -> bool:
     """Make a VDI of what has changed for this frame's view, if it is a whole picture."""
     follows = seen.one_view and seen.first_look and seen.regenerate != "never"
-    return "follow" if follows and seen.made and seen.stale and not seen.failed else None
+    return follows and seen.made is not None and seen.stale and not seen.failed
 
 
 def _other(seen: Seen, content: Any) -> bool:
@@ -330,27 +248,18 @@ def _unknown(seen: Seen) -> bool:
         return False
     if seen.hand or not seen.settled or seen.estimating or seen.failed:
         return False
-    if known is None or known.vdi != made.number:
+    if known is None or known.vdi != made.known:
         return True
     return seen.view.distance(known.view, made.bounds) > _ANOTHER_ESTIMATE
 
 
 def _better(seen: Seen, made: Made) -> RenderMode:
     """Choose VDI or volume, whichever is expected to give the better picture in time."""
-    ssim = ssim_of(seen.pictures, seen.estimate, made.number, seen.view)
+    known = seen.estimate
+    ssim = known.ssim if known is not None and known.vdi == made.known else None
     bound = SIMILAR if seen.bound is None else seen.bound
     seconds = seen.seconds if seen.moving else None
     return seen.costs.better(made.angle, made.pixels, seconds, ssim, bound)
-
-
-def ssim_of(
-    pictures: Pictures, estimate: ViewEstimate | None, vdi: int | None, view: View | None
-) -> float | None:
-    """Return what was estimated for a VDI: of this very picture, or else last in the background."""
-    for each in reversed(pictures.judged):
-        if each.view == view:
-            return each.ssim
-    return estimate.ssim if estimate is not None and estimate.vdi == vdi else None
 
 
 def lacking(seen: Made, cone: float, remedy: str) -> list[tuple[str, str]]:

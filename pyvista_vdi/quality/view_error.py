@@ -20,12 +20,12 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidCameraError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
@@ -48,8 +48,6 @@ _COARSE_LAUNCH = 8192
 #: Arguments of ``structural_similarity`` for the coarse pictures: a window of 5 of their pixels.
 _COARSE_SSIM = {**SSIM_ARGUMENTS, "sigma": 0.7}
 _COARSE_WINDOW = 5
-#: Edge in pixels of the blocks within which contrast is compared.
-_BLOCK = 4
 #: Weight of a difference between the coarse pictures against detail within one.
 _DIFFERENCE_WEIGHT = 3.0
 #: Share of the tiles that are spread evenly, whatever the coarse pictures show.
@@ -63,19 +61,16 @@ class ViewError:
     """What is known of a VDI's error in a view."""
 
     ssim: float  # predicted, of the VDI's picture against the volume's; NaN below 11 pixels
-    angle: float  # degrees, see angle_from_generating_view()
-    magnification: float  # pixels per list, see magnification()
     tiles: int  # that were rendered; 0 where the volume is not in view
-    contrast: float = 1.0  # within 4 x 4 pixels over the volume's: below 1 where detail is missing
 
 
 class ViewErrorEstimator:
     """Estimates the error of VDIs of one volume; keeps the volume on the device.
 
-    The volume is sampled as ``medium`` and ``changes`` of its options say: as it was when the VDIs
-    were generated, but for the lights, which are those of the view that is judged. An estimate
-    takes ``tiles`` of ``tile_size`` pixels along each edge; what SSIM compares around a pixel
-    reaches five pixels to each side, so a tile of 24 tells the SSIM of 14 x 14 pixels.
+    The volume is sampled as ``medium`` says: as it was when the VDIs were generated, but for the
+    lights, which are those of the view that is judged. An estimate takes 16 tiles of 24 pixels
+    along each edge; what SSIM compares around a pixel reaches five pixels to each side, so a tile
+    tells the SSIM of 14 x 14 pixels.
 
     The picture is cut into cells as large as what a tile tells, inside the rectangle around the
     bounds (elsewhere both pictures are empty, and SSIM is 1). Both pictures are rendered at a
@@ -92,15 +87,11 @@ class ViewErrorEstimator:
         transfer_function: TransferFunction,
         medium: MediumOptions | None = None,
         *,
-        tiles: int = TILES,
-        tile_size: int = TILE_SIZE,
         device: Any = None,
-        **changes: Any,
     ) -> None:
-        options = MediumOptions.of(medium, changes)
-        self._tiles, self._edge = tiles, tile_size - 2 * REACH
+        options = medium or MediumOptions()
         self._runtime = get_runtime(device)
-        edge = max(tile_size, math.isqrt(2 * _COARSE_LAUNCH))  # of what is rendered at a time
+        edge = max(TILE_SIZE, math.isqrt(2 * _COARSE_LAUNCH))  # of what is rendered at a time
         room = picture_room((edge, edge), options.memory_limit)
         self._medium = DeviceVolume(self._runtime, volume, transfer_function, options, room=room)
 
@@ -122,16 +113,14 @@ class ViewErrorEstimator:
         camera = Camera.from_any(camera)
         size = check_window_size(vdi.window_size if window_size is None else window_size)
         request = FrameRequest(camera, size, options or RenderOptions(), device=self._runtime)
-        where = (angle_from_generating_view(vdi, camera), magnification(vdi, camera, size))
         if min(size) < SSIM_WINDOW:
-            return ViewError(math.nan, *where, 0)
+            return ViewError(math.nan, 0)
         sample = self.sample(vdi, request, background)
         if sample is None:
-            return ViewError(1.0, *where, 0)
+            return ViewError(1.0, 0)
         old, new = self.tiles(sample, request, vdi), self.tiles(sample, request)
         ssim = sample.infer(tiles_ssim(old, new, background))
-        contrast = contrast_ratio(old, new, 1 / sample.chances, background)
-        return ViewError(ssim, *where, len(new), contrast)
+        return ViewError(ssim, len(new))
 
     def sample(
         self, vdi: VDI, request: FrameRequest, background: Sequence[float] = (0.0, 0.0, 0.0)
@@ -145,10 +134,10 @@ class ViewErrorEstimator:
         region = seen_region(camera, size, (vdi.bounds, self._medium.volume.bounds))
         if region is None:
             return None
-        cells = Cells(*region, size, self._edge)
+        cells = Cells(*region, size, TILE_SIZE - 2 * REACH)
         n = len(cells.corners)
-        if n <= self._tiles:
-            return cells.sample(np.ones(n), self._tiles)
+        if n <= TILES:
+            return cells.sample(np.ones(n), TILES)
         # Draw coarse pictures of the region both ways, in bands
         (left, top), extents = region
         columns, rows = (-(-extent // COARSE) for extent in extents)
@@ -162,7 +151,7 @@ class ViewErrorEstimator:
             pictures[0].append(render_vdi(vdi, part))
             pictures[1].append(raycast_medium(self._medium, part))
         old, new = (over_background(np.concatenate(each), background) for each in pictures)
-        return cells.sample(cells.guess(old, new), self._tiles)
+        return cells.sample(cells.guess(old, new), TILES)
 
     def tiles(
         self, sample: TileSample, request: FrameRequest, vdi: VDI | None = None
@@ -299,27 +288,6 @@ def tiles_ssim(
     inner = slice(REACH, -REACH)
     by_tile = ssim.reshape(len(new), *new[0].shape[:2], 3)[:, inner, inner]
     return np.asarray(by_tile.mean(axis=(1, 2, 3)))
-
-
-def contrast_ratio(
-    old: Sequence[Picture],
-    new: Sequence[Picture],
-    weights: Floats,
-    background: Sequence[float] = (0.0, 0.0, 0.0),
-) -> float:
-    """Return the contrast of tiles within blocks of pixels over that of others, weighted by tile.
-
-    It is the mean standard deviation of a channel within 4 x 4 pixels; 1 where neither has any.
-    """
-    sums = []
-    for tiles in (old, new):
-        height, width = tiles[0].shape[:2]
-        n, high, wide = len(tiles), height // _BLOCK, width // _BLOCK
-        pictures = over_background(np.concatenate(tiles), background)
-        blocks = pictures.reshape(n, height, width, 3)[:, : high * _BLOCK, : wide * _BLOCK]
-        blocks = blocks.reshape(n, high, _BLOCK, wide, _BLOCK, 3)
-        sums.append(float(weights @ blocks.std(axis=(2, 4)).mean(axis=(1, 2, 3))))
-    return sums[0] / sums[1] if sums[1] > 0 else 1.0
 
 
 class Cells:

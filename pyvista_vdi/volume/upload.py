@@ -20,7 +20,7 @@ from pyvista_vdi.model.float32_limits import LARGEST_POWER, LARGEST_VOXEL, scala
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.lighting import Light, Lights, Shading
 from pyvista_vdi.model.transfer_function import GRADIENT_SHARE, TransferFunction
-from pyvista_vdi.model.volume import Geometry, Volume
+from pyvista_vdi.model.volume import Grid, Volume
 from pyvista_vdi.volume.bricks import Room, in_parts
 from pyvista_vdi.volume.rays import Variant
 
@@ -369,7 +369,7 @@ def shading_variant(transfer_function: TransferFunction, lights: Lights) -> dict
 
 
 def lighting_table(
-    grid: Geometry, camera: Camera, shading: Shading, lights: Lights
+    grid: Grid, camera: Camera, shading: Shading, lights: Lights
 ) -> NDArray[np.float32]:
     """Return the material and the lights of a view.
 

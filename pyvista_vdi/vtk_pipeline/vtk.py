@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import locale
 import os
-import re
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -21,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from packaging.version import Version
 
-from pyvista_vdi.errors import MissingDependencyError, UnsupportedError
+from pyvista_vdi.errors import MissingDependencyError
 
 if TYPE_CHECKING:  # what editors show; with mypy every name is Any, by __getattr__
     from vtkmodules.all import *
@@ -112,33 +111,9 @@ def caught_messages() -> Iterator[Any]:
 
 
 def explain_import_error(error: ImportError) -> MissingDependencyError:
-    """Return the error that tells how to make VTK importable: which Debian package it lacks."""
-    text = str(error)
-    if library := re.search(r"lib[\w-]+\.so[.\d]*", text):
-        return MissingDependencyError(
-            f"VTK cannot be loaded, because the system library {library[0]} is missing: on "
-            f"Debian and Ubuntu apt install {_DEBIAN}"
-        )
-    if BACKEND == "vtkmodules":
-        return MissingDependencyError(
-            f'VTK cannot be loaded ({text}): install it by pip install "pyvista-vdi[plot]"'
-        )
+    """Return the error that tells how to make VTK importable."""
     return MissingDependencyError(
-        f"VTK cannot be loaded from {BACKEND} ({text}): install all of it, as by pip install "
-        f'"{BACKEND}[all]", or choose another build by the environment variable '
-        "PYVISTA_VTK_BACKEND=vtk"
+        f'VTK cannot be loaded from {BACKEND} ({error}): install it by pip install "pyvista-vdi'
+        '[plot]", or all of cvista by pip install "cvista[all]"; a system library that is missing '
+        f"comes, on Debian and Ubuntu, with apt install {_DEBIAN}"
     )
-
-
-def require_this_build(kind: type) -> None:
-    """Refuse a class of another build of VTK, by name; what is none of VTK's passes."""
-    this = __getattr__("vtkObjectBase")
-    base = next((each for each in kind.__mro__ if each.__name__ == "vtkObjectBase"), this)
-    if base is not this:
-        other = base.__module__.partition(".")[0]
-        raise UnsupportedError(
-            f"the {kind.__name__} is an object of {other}, which {BACKEND}, the VTK that this "
-            f"process uses, cannot take: make it with {BACKEND}, of NumPy arrays for example, or "
-            "set the environment variable PYVISTA_VTK_BACKEND="
-            f"{'vtk' if other == 'vtkmodules' else other} before PyVista is imported"
-        )

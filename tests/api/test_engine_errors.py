@@ -87,7 +87,7 @@ def test_a_volume_too_large_is_named(runtime, make, draw, monkeypatch):
 @pytest.fixture
 def sliced(make):
     """``make`` in slices of four rows, so that a small window takes several."""
-    return functools.partial(make, memory_limit="2.5 MiB")
+    return functools.partial(make, memory_limit=5 * 2**19)
 
 
 @pytest.mark.parametrize(("error", "at"), [(Cancelled, 4 / 9), (KeyboardInterrupt, 1.0)])

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import collections.abc
-import dataclasses
 import inspect
 import re
 import textwrap
@@ -19,7 +18,6 @@ import pyvista_vdi
 from pyvista_vdi import api
 from pyvista_vdi.model import types
 from pyvista_vdi.model.arguments import Settings
-from pyvista_vdi.model.options import GenerationOptions
 
 PACKAGE = Path(pyvista_vdi.__file__).parent
 #: Modules that names in annotations are imported from; else it is where the class is.
@@ -109,15 +107,6 @@ def stubs():
     maker = type("", (), {"__signature__": made})
     text += definition(maker, "__init__", margin="    ", **{"return": None})
     yield "api/__init__.pyi", stub("The public functions and their options", text)
-    text = "class OptionMethods:\n"
-    for each in dataclasses.fields(GenerationOptions):
-        if each.name != "lights":
-            name = each.name.title().replace("_", "")
-            kind = GenerationOptions.declared[each.name].kind
-            text += f"    def Set{name}(self, value: {kind}) -> None: ...\n"
-            text += f"    def Get{name}(self) -> {each.type}: ...\n"
-    about = "Set and Get of each option of how a VDI is made"
-    yield "vtk_pipeline/filters/option_methods.pyi", stub(about, text)
 
 
 def test_stubs_are_those_of_the_records():

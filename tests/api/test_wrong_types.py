@@ -42,7 +42,7 @@ OF_GENERATE = [
     if each.name not in (*MADE, *LOOK) and each.kind is not each.VAR_KEYWORD
 ]
 #: Settings that generate has no use for.
-_OF_PICTURES = ("transmittance_cutoff", "adjust_multi_samples", "regenerate_below", "coverage")
+_OF_PICTURES = ("transmittance_cutoff", "regenerate_below", "coverage")
 #: For each entry: the function, what is right, and further arguments.
 ENTRIES = {
     "generate": lambda vdi: (pvdi.generate, TABLED, OF_GENERATE),

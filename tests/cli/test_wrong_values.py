@@ -51,7 +51,7 @@ ALIKE = {
     NO_NUMBER: "azimuth elevation time",
     BELOW_0: "ambient diffuse specular specular-power tolerance view-cone transmittance-cutoff",
     NOT_ABOVE_0: "full-fps half-angle lists max-bytes memory-limit "
-    "opacity-unit-distance parallel-scale sample-distance target-angle target-fps "
+    "opacity-unit-distance parallel-scale sample-distance target-fps "
     "target-ssim thickness view-angle",
     NO_COUNT: "generations max-supersegments n-colors repeats views",
     NO_WHOLE: "compression-level port time-index level",

@@ -59,6 +59,6 @@ def test_across_work_group_sizes(runtime, monkeypatch, group, expected):
 
 def test_across_slices(runtime, expected):
     """However many rows of lists are made at a time, and in the background or not."""
-    assert digest(runtime, memory_limit="3 MiB") == expected  # slices of four rows
+    assert digest(runtime, memory_limit=3 * 2**20) == expected  # slices of four rows
     with runtime.background():
         assert digest(runtime) == expected

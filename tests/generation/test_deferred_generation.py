@@ -7,12 +7,9 @@ import pytest
 from settings import with_settings
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.generation.deferred import generate_deferred
-from pyvista_vdi.model.classify_values import classify
-from pyvista_vdi.model.deferred import lengths_of
 from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
-from pyvista_vdi.raycasting.classified_values import classify_on_device
 
 EDGES = NX, NY, NZ = 7, 6, 33
 #: Lengths of a column's voxels: the first and the last reach half as far into the grid.
@@ -79,25 +76,6 @@ def test_what_is_outside_the_range_ends_a_supersegment_and_is_no_part_of_it(runt
         assert one.spread[rows] == 0
 
 
-@pytest.mark.parametrize("seed", [1, 3])
-def test_the_device_classifies_as_float64_does(runtime, seed):
-    rng = np.random.default_rng(seed)
-    array = rng.random(EDGES[::-1]).astype(np.float32)
-    deferred = kept(runtime, array, (0, 1), max_supersegments=[60, 6, 3, 1][seed])
-    opacities = np.where(rng.random(40) < 0.3, 0, rng.random(40) ** [8, 3, 1, 0][seed])
-    looks = pvdi.TransferFunction(rng.random((40, 3)), opacities, (0, 1))
-    found, wanted = classify_on_device(deferred, looks, runtime), classify(deferred, looks)
-    # What next to nothing is seen of may be nothing on the device, whose table has steps of 2^-40
-    some, those = found.optical_depth > 1e-6, wanted.optical_depth > 1e-6
-    assert np.array_equal(found.front[some], wanted.front[those])
-    assert found.color[some] == pytest.approx(wanted.color[those], abs=5e-5)
-    # Of an opacity of a step of nearly 1 float32 holds less; what is behind it is not seen
-    dense = 8 * lengths_of(wanted)[those] / deferred.sample_distance
-    tau, exact = found.optical_depth[some], wanted.optical_depth[those]
-    assert tau[exact <= dense] == pytest.approx(exact[exact <= dense], rel=2e-4)
-    assert (tau[exact > dense] >= 0.9 * dense[exact > dense]).all()
-
-
 def test_generate_returns_one_and_bakes_by_default(runtime):
     volume, camera = columns(np.random.default_rng(8).random(EDGES[::-1]).astype(np.float32))
     asked = {"device": runtime, "max_supersegments": 5}
@@ -106,15 +84,12 @@ def test_generate_returns_one_and_bakes_by_default(runtime):
     )
     assert isinstance(deferred, pvdi.DeferredVDI)
     assert deferred.value_range == (0.2, 0.8)
-    assert deferred.metadata["volume"]["scalar_range"] == list(volume.finite_range())
     looks = pvdi.TransferFunction([[0, 0, 0], [1, 1, 1]], [0, 0.5], (0, 1))
     baked = [
         pvdi.generate(volume, camera, (NX, NY), transfer_function=looks, **asked, **more)
         for more in ({}, {"classification": "baked"})
     ]
     assert baked[0].equals(baked[1])
-    with pytest.warns(VDIWarning, match=r"outside 0.2 to 0.8.*of its opacity"):
-        deferred.classified(transfer_function=looks)
 
 
 @pytest.mark.parametrize(
@@ -142,22 +117,3 @@ def test_what_cannot_be_deferred_is_refused_by_name(runtime, asked, error, says)
             device=runtime,
             **{"classification": "deferred", **with_settings(**asked)},
         )
-
-
-def test_a_range_that_fits_no_values_is_warned_of(default_runtime):
-    rng = np.random.default_rng(2)
-    array = (rng.random(EDGES[::-1]) * 200).astype(np.float32)
-    _, camera = columns(array)
-
-    def made(values, **how):
-        volume = pvdi.Volume(values)
-        return pvdi.generate(volume, camera, (NX, NY), classification="deferred", **how)
-
-    made(array, value_range=(0, 1000))
-    with pytest.warns(VDIWarning, match="a small part of the range from 0 to 65535"):
-        made(array, value_range=(0, 65535))
-    with pytest.warns(VDIWarning, match="this VDI is empty: there is nothing from 300 to 400"):
-        made(array, value_range=(300, 400))
-    filled = np.where(np.arange(array.size).reshape(array.shape) == 5, np.float32(1e20), array)
-    with pytest.warns(VDIWarning, match="nearly all values lie from .* to 1e\\+20"):
-        made(filled.astype(np.float32))

@@ -30,7 +30,7 @@ SHADED = {"shading": Shading(0.2, 0.7, 0.4, 8.0)}
     [
         ("march_lists", "uint8", "nearest", "all of it", PLAIN, True, FINE),
         ("march_lists", "float32", "linear", "from inside", GRADIENT | SHADED, False, LAMP),
-        ("march_lists", "uint8", "nearest", "past it", PLAIN, False, {"memory_limit": "4 MiB"}),
+        ("march_lists", "uint8", "nearest", "past it", PLAIN, False, {"memory_limit": 2**22}),
         ("march_lists", "uint8", "nearest", "parallel", PLAIN, False, {"criterion": "homogeneity"}),
         ("shorten_lists", "uint8", "nearest", "along an axis", PLAIN, True, {"tolerance": 0.05}),
         ("shorten_lists", "uint8", "nearest", "parallel", PLAIN, False, {"max_supersegments": 5}),

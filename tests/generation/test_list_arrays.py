@@ -17,7 +17,7 @@ from pyvista_vdi.model.host_memory import GrowingArray
 HALF_BESIDE = Camera((3.5, -4.0, 30), (3.5, -4.0, 3.5), (0, 1, 0))
 
 #: What slices of four rows need, and more rows do not fit into.
-FOUR_ROWS = {"memory_limit": "2 MiB"}
+FOUR_ROWS = {"memory_limit": 2**21}
 
 
 @pytest.fixture

@@ -105,7 +105,7 @@ def test_spacing_axes_levels_time_and_channel(image):
     assert volume.dimensions == (24, 16, 8)
     assert volume.spacing == (0.25, 0.5, 2.0)
     assert volume.origin == (30.0, 20.0, 10.0)
-    assert volume.chunks.chunks == (4, 8, 8)
+    assert volume.array.chunks == (4, 8, 8)
     np.testing.assert_array_equal(volume.load().array, VALUES[1, 2])
     box = (slice(1, 7), slice(3, 16), slice(5, 6))
     np.testing.assert_array_equal(volume.array[box], VALUES[1, 2][box])

@@ -48,7 +48,7 @@ def test_parts_are_those_of_the_array(source, dtype, tmp_path):
     assert volume.chunked
     assert not expected.chunked
     for again in (volume, pickle.loads(pickle.dumps(volume))):
-        assert again.chunks.chunks == CHUNKS
+        assert again.array.chunks == CHUNKS
         assert again.array.dtype == expected.array.dtype
         assert again.array.shape == values.shape
         assert again.array.nbytes == expected.array.nbytes
@@ -94,6 +94,6 @@ def test_what_needs_the_whole_array_says_so():
     ):
         with pytest.raises(InvalidVolumeError, match=r"read chunk by chunk.*volume\.load\(\)"):
             use()
-    with pytest.raises(InvalidVolumeError, match="three slices of step 1"):
+    with pytest.raises(InvalidVolumeError, match="by three slices of step 1"):
         volume.array[0]
     assert not hasattr(volume.array, "something")

@@ -70,7 +70,7 @@ def test_the_same_bytes(runtime, background, dtype, parallel):
     """As generate_vdi, which does not work in pieces; of a volume that is not there yet, too."""
     camera = CAMERA.replace(parallel_projection=parallel, parallel_scale=15.0)
     # Little enough that a slice of a VDI is four rows of lists
-    options = {"max_supersegments": 6, "memory_limit": "4 MiB", "device": runtime}
+    options = {"max_supersegments": 6, "memory_limit": 2**22, "device": runtime}
     background.put(vdi_job(request(volume(dtype), camera, WINDOW, TRANSFER, **options)))
     made = taken(background)
     expected = generate_vdi(

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.transfer_function import OPAQUE_OPTICAL_DEPTH, TransferFunction
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.model.volume import Volume
 from reference.compositing import Segment, composite, merge
 from reference.raycast import HalfSpace, Ray, clip, inside_box, pixel_ray

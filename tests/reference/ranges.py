@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.view import bounds_corners
 from reference.raycast import Line, Lists, Rays, composite_lines, near_limit
 
 Array = NDArray[np.float64]

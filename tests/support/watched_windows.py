@@ -13,7 +13,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.quality import background
 from pyvista_vdi.quality.rate import FrameRate
 from pyvista_vdi.quality.view_error import ViewError
-from pyvista_vdi.vtk_pipeline.drawing import background as making
+from pyvista_vdi.vtk_pipeline.drawing import planner
 from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkUnsignedCharArray
 
 #: Odd, so that no smaller image divides it.
@@ -71,9 +71,9 @@ def no_estimates(monkeypatch):
 
         def estimate(self, *_, **__):
             answer.asked += 1
-            return ViewError(answer.ssim, 0.0, 1.0, 1)
+            return ViewError(answer.ssim, 1)
 
-    monkeypatch.setattr(making, "ViewErrorEstimator", Estimator)
+    monkeypatch.setattr(planner, "ViewErrorEstimator", Estimator)
     return answer
 
 

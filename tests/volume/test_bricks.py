@@ -15,7 +15,7 @@ from pyvista_vdi.volume.bricks import DeviceBricks
 
 WINDOW = (20, 13)
 #: Little enough that the volumes below do not fit, enough for the rays of that window.
-LIMIT = 2.6 * 2**20
+LIMIT = int(2.6 * 2**20)
 RNG = np.random.default_rng(7)
 _K, _J, _I = np.meshgrid(*(np.arange(n) / 60 for n in (71, 150, 183)), indexing="ij")
 #: Waves, and noise at every voxel, 0 to 1, with a transparent half; nowhere a multiple of a brick.
@@ -111,7 +111,7 @@ def test_same_bytes_as_in_one_piece(runtime, used, view, looks, colours):
     again = Volume(volume.array)  # of which nobody has looked for the largest value
     limited = make(runtime, again, camera, function, lights=lights, memory_limit=LIMIT)
     assert limited.equals(whole)
-    shown["memory_limit"] = LIMIT * 0.8
+    shown["memory_limit"] = LIMIT * 4 // 5
     assert np.array_equal(
         raycast_volume(again, camera, WINDOW, function, **shown, **options), image
     )

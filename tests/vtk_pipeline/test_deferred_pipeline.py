@@ -1,4 +1,4 @@
-"""Values that are kept, in a VTK pipeline: a source of them, a picture's property."""
+"""Values that are kept, in a VTK pipeline: a picture's property classifies them."""
 
 from __future__ import annotations
 
@@ -9,21 +9,12 @@ from settings import with_settings
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.vtk_pipeline import VDIToImage
+from pyvista_vdi.vtk_pipeline import VDIToImage, vdi_to_image
 from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkVolumeProperty
 
 CAMERA = pvdi.Camera((0, -6, 2), (0, 0, 0), (0, 0, 1))
 SIZE = (24, 18)
 KEPT = {"value_range": (30, 220)}
-
-
-def source():
-    source = pvdi.VDISource()
-    source.SetInputDataObject(soft_ball(12))
-    source.SetCamera(CAMERA)
-    source.SetWindowSize(SIZE)
-    source.SetDeferral("deferred", **KEPT)
-    return source
 
 
 def shown_by(prop, vdi):
@@ -46,20 +37,16 @@ def some_property():
     return prop
 
 
-def test_a_source_keeps_values_and_a_property_classifies_them(default_runtime, monkeypatch):
-    keeping, prop = source(), some_property()
-    kept = keeping.GetVDI()
+def test_a_property_classifies_the_values_of_a_picture(default_runtime):
     direct = {"classification": "deferred", **KEPT, "device": default_runtime}
-    assert kept.equals(pvdi.generate(soft_ball(12), CAMERA, SIZE, **with_settings(**direct)))
-    monkeypatch.setattr("pyvista_vdi.vtk_pipeline.filters.source.generate_deferred", None)
-    picture = VDIToImage()
-    picture.SetInputConnection(keeping.GetOutputPort())
+    kept = pvdi.generate(soft_ball(12), CAMERA, SIZE, **with_settings(**direct))
+    prop, picture = some_property(), VDIToImage()
+    picture.SetInputData(vdi_to_image(kept))
     with pytest.raises(InvalidArgumentError, match="SetVolumeProperty"):
         picture.Update()
     picture.SetVolumeProperty(prop)
     first = pixels(picture).copy()
     np.testing.assert_array_equal(first, shown_by(prop, kept))
     prop.GetScalarOpacity().AddPoint(100, 0)
-    keeping.SetVolumeProperty(prop)  # which decides nothing here
     np.testing.assert_array_equal(pixels(picture), shown_by(prop, kept))
     assert np.abs(pixels(picture) - first).max() > 0.1

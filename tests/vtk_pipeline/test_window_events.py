@@ -230,14 +230,14 @@ def test_plays(plotter):
     actor = plotter.add_vdi(pvdi.VDISeries([small_vdi() for _ in range(3)]))
     actor.mapper.SetInteractiveOffScreen(True)
     plotter.show(auto_close=False)
-    actor.play(rate=200)
+    actor.player.play(rate=200)
     seen = set()
-    frames_until(plotter, lambda: seen.add(actor.step) or len(seen) == 3)
-    actor.pause()
+    frames_until(plotter, lambda: seen.add(actor.player.step) or len(seen) == 3)
+    actor.player.pause()
     finish("series")
-    step = actor.step
+    step = actor.player.step
     frames(plotter, 3)
-    assert actor.step == step
+    assert actor.player.step == step
 
 
 def test_closed(gate):

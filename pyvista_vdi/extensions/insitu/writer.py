@@ -27,7 +27,7 @@ from pyvista_vdi.extensions.series.writer import SeriesWriter
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.model.arguments import names_of, records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_whole, not_taken, three_wholes
+from pyvista_vdi.model.checks import Number, as_vector
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
@@ -124,15 +124,14 @@ class InSitu:
         self._writer: SeriesWriter | None = None
         self.seconds: list[float] = []
         with together(comm, "InSitu", InvalidArgumentError):
-            self._every = as_whole(every)
-            if not self._every >= 1:
-                text = f"every must be a whole number of steps from 1; got {every!r}"
-                raise not_taken(every)(text)
+            steps = Number("a whole number of steps from 1", 1, whole=True, name="every")
+            self._every = steps(every)
             self._camera = Camera.from_any(camera)
             self._size = check_window_size(window_size)
-            points = three_wholes(dimensions, "dimensions must be the points along x, y and z", 2)
+            count = Number("three whole numbers of points from 2", 2, whole=True, name="dimensions")
+            x, y, z = map(count, as_vector(dimensions, "dimensions"))
             of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
-            self._grid = asdict(Grid(points, of.spacing, of.origin, of.direction))
+            self._grid = asdict(Grid((x, y, z), of.spacing, of.origin, of.direction))
             self._check(options)
         require_same(
             comm,
@@ -203,8 +202,8 @@ class InSitu:
                 )
             at = checked_time(at)
             own = Volume(values, self._grid["spacing"], self._grid["origin"]).load()
-            what = "first must be the index x, y, z of the block's first point in the whole grid"
-            first = three_wholes(first, what, 0)
+            index = Number("three whole numbers, the index of a point", whole=True, name="first")
+            x, y, z = map(index, as_vector(first, "first"))
             get_runtime(self._device)
             if self._function is None:
                 self._function = self._looks.transfer_function_of(own)
@@ -217,7 +216,9 @@ class InSitu:
         )
         low, high = zip(*self._comm.allgather(ends), strict=True)
         ends = float(np.fmin.reduce(low)), float(np.fmax.reduce(high))
-        grid: Any = SharedGrid(**self._grid, array=own.array, rgba=own.rgba, first=first, ends=ends)
+        grid: Any = SharedGrid(
+            **self._grid, array=own.array, rgba=own.rgba, first=(x, y, z), ends=ends
+        )
         request = GenerationRequest(
             grid,
             self._function,

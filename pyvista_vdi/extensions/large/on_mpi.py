@@ -35,7 +35,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Grid
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(kw_only=True)
 class SharedGrid(Grid):
     """A grid whose points are shared out, in place of a request's volume.
 
@@ -48,7 +48,7 @@ class SharedGrid(Grid):
     ends: Ends
     rgba: bool
     name: str = "values"
-    chunks: None = None
+    chunked: bool = False
 
     def finite_range(self) -> Ends:
         """Return the least and the largest scalar, NaN left out."""

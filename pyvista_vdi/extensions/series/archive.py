@@ -159,7 +159,7 @@ def write_to(
         archive.writestr(writer.stored(vdis.kind.head), head_bytes(vdis.kind, vdis.about))
         for i in range(len(vdis)):
             vdi, file = vdis[i].with_precision(precision), io.BytesIO()
-            writer.write_to(file, vdi.lists, compression, level, coarse=False)
+            writer.write_to(file, vdi, compression, level, coarse=False)
             archive.writestr(writer.stored(name_of(i)), file.getvalue())
             first = first or stream.tell()
             done()

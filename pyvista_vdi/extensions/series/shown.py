@@ -12,10 +12,11 @@ from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled, InvalidArgumentError
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_float, as_whole, memory_limit_bytes
+from pyvista_vdi.model.checks import as_float, as_whole
 from pyvista_vdi.model.collection import RATE
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.background import BackgroundThread, Job
 from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
@@ -131,11 +132,11 @@ class SeriesInput(SeveralInput):
 
     def __init__(self, series: VDISeries, clock: Callable[[], float] = time.perf_counter) -> None:
         super().__init__(series, "pyvista-vdi series")
-        self.series = series
         self.device: Any = None
         #: Steps per second, and whether one is shown after the other.
         self.rate, self.playing = RATE, False
         self._clock, self._loop = clock, True
+        self._changed: Callable[..., Any] | None = None  # tells the mapper that it plays
         # Places go on where the series begins anew: place p is step p modulo the steps
         self._place = self._from = 0
         self._since: float | None = None  # when the place before was due; None before a frame
@@ -149,12 +150,12 @@ class SeriesInput(SeveralInput):
 
     @property
     def step(self) -> int:
-        """Index of the step that is shown."""
-        return self._place % len(self.series)
+        """Index of the step that is shown; negative ones that are set are from the end."""
+        return self._place % len(self.collection)
 
     @step.setter
     def step(self, step: int) -> None:
-        n = len(self.series)
+        n = len(self.collection)
         if not -n <= as_whole(step) < n:
             raise InvalidArgumentError(
                 f"step must be a whole number from {-n}, the first one, to {n - 1}; got {step!r}"
@@ -163,21 +164,16 @@ class SeriesInput(SeveralInput):
 
     @property
     def time(self) -> float:
-        """Time of the step that is shown."""
-        return self.series.times[self.step]
+        """Time of the step that is shown; of one that is set the nearest step is shown."""
+        return self.collection.times[self.step]
 
     @time.setter
     def time(self, time: float) -> None:
-        self.step = self.series.nearest(time)
-
-    @property
-    def current(self) -> Any:
-        """The step that is shown, read now if it is not ready."""
-        return self._at(self.step)
+        self.step = self.collection.nearest(time)
 
     def vdi(self) -> VDI:
         """Return the step's VDI; of values what the property makes of them."""
-        step = self.current
+        step: Any = self._at(self.step)
         if isinstance(step, DeferredVDI) and self.prop is not None:
             if self._kept is None or (self._kept.deferred, self._kept.prop) != (step, self.prop):
                 self._kept = DeferredInput(step, self.prop)
@@ -188,11 +184,12 @@ class SeriesInput(SeveralInput):
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
         """The step's values, where it keeps them."""
-        return step if isinstance(step := self.current, DeferredVDI) else None
+        step: Any = self._at(self.step)
+        return step if isinstance(step, DeferredVDI) else None
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds of the step that was shown last, or of the first."""
-        return self.series.bounds if self._vdi is None else self._vdi.bounds
+        return self.collection.bounds if self._vdi is None else self._vdi.bounds
 
     def stamp(self) -> Any:
         """Return the step, and the time stamp of what classifies it."""
@@ -200,7 +197,7 @@ class SeriesInput(SeveralInput):
 
     def shared(self) -> Input:
         """Return an input that shows the same step, and plays by itself."""
-        other = SeriesInput(self.series)
+        other = SeriesInput(self.collection)
         other.step, other.prop = self.step, self.prop
         return other
 
@@ -208,31 +205,34 @@ class SeriesInput(SeveralInput):
         """Read for a device."""
         self.device = device
 
-    @property
-    def busy(self) -> bool:  # type: ignore[override]
-        """Whether it plays."""
-        return self.playing
-
-    @property
-    def period(self) -> int:  # type: ignore[override]
-        """Milliseconds between two looks at what goes on."""
-        return period_of(self.rate)
+    def watch(self, changed: Callable[..., Any] | None) -> None:
+        """Call this when it begins to play; ``None`` ends it."""
+        self._changed = changed
 
     def complaint(self, error: BaseException) -> str:
         """Return that a step is left out."""
         return f"a step is left out: {type(error).__name__}: {error}"
 
     def play(
-        self, rate: float = RATE, *, loop: bool = True, memory_limit: float | str | None = None
+        self, rate: float = RATE, *, loop: bool = True, memory_limit: int | None = None
     ) -> None:
-        """Go on from the step that is shown, or from the first where the last one is."""
+        """Show one step after the other, ``rate`` a second, from the one that is shown.
+
+        Time does not wait: steps that are not ready when theirs comes are left out. Without an
+        event loop, as off-screen, a frame shows the step of the moment; for a movie set
+        :attr:`time`. ``loop``: whether the first step follows the last. ``memory_limit``: bytes
+        that decoded steps may take; 1 GiB by default.
+        """
         if isinstance(rate, bool) or not 0 < as_float(rate) < math.inf:
             raise InvalidArgumentError(f"rate must be steps per second, above 0; got {rate!r}")
-        self.memory = memory_limit_bytes(memory_limit) or self.memory
+        self.memory = MediumOptions(memory_limit=memory_limit).memory_limit or self.memory
         self.rate, self._loop = as_float(rate), bool(loop)
-        last = len(self.series) - 1
+        self.period = period_of(self.rate)
+        last = len(self.collection) - 1
         self._begin(0 if not loop and self.step == last else self.step)
         self.playing = last > 0
+        if self._changed is not None:
+            self._changed()
 
     def pause(self) -> None:
         """Stay at the step that is shown."""
@@ -242,7 +242,7 @@ class SeriesInput(SeveralInput):
         """Show the last step that is due and ready; whether it is another one."""
         if not self.playing:
             return False
-        now, n = self._clock(), len(self.series)
+        now, n = self._clock(), len(self.collection)
         self._since = now if self._since is None else self._since
         due = self._due_at(now)
         with self._lock:
@@ -277,14 +277,14 @@ class SeriesInput(SeveralInput):
         """Return the place whose time has come at a moment."""
         since = now if self._since is None else self._since
         place = self._from + int((now - since) * self.rate)
-        return place if self._loop else min(place, len(self.series) - 1)
+        return place if self._loop else min(place, len(self.collection) - 1)
 
     def _trim(self) -> None:
         """Drop what memory is not enough for, first what is shown in the longest time.
 
         In a round that does not fit, the same steps are kept in each.
         """
-        n = len(self.series)
+        n = len(self.collection)
         # A step may be shown although the next one is due already
         first = max(self._place, self._due_at(self._clock()) - 1) if self.playing else self._place
         last = sorted(self._ready, key=lambda step: (step != self.step, (step - first) % n))
@@ -293,7 +293,7 @@ class SeriesInput(SeveralInput):
             taken -= self._ready.pop(last.pop()).nbytes * (1 + ON_DEVICE)
 
     def _wanted(self) -> int | None:
-        n = len(self.series)
+        n = len(self.collection)
         if not self.playing:
             return None
         with self._lock:

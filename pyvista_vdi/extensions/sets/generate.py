@@ -16,11 +16,11 @@ from pyvista_vdi.model.arguments import names_of, records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_whole
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.coverage import bounds_corners, covering_view
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.types import CameraLike, DeviceLike, Progress, VolumeLike, WindowSize
+from pyvista_vdi.model.view import bounds_corners, covering_view
 from pyvista_vdi.quality.view_error import world_centre
 
 #: Half angle of the cone that a V_O of a set has to serve, degrees: others serve what is beyond.
@@ -120,7 +120,7 @@ def generate_set(
         begin = filling_camera(read.bounds, size) if camera is None else Camera.from_any(camera)
         axis = np.subtract(begin.position, world_centre(begin, read.bounds))
         cameras = orbit(begin, read.bounds, spread(int(as_whole(views)), axis, half_angle))
-    read = read.load_in_view(*cameras, window_size=size)
+    read = read.load(*cameras, window_size=size)
     table, done = looks.transfer_function_of(read), Pieces(progress, len(cameras))
     about = {"classification": looks.describe(), "scalars": read.name}
     edges = max(1, round(lists * size[0])), max(1, round(lists * size[1]))

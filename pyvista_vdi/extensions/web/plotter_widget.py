@@ -78,11 +78,11 @@ class PlotterWidget(VDIWidget):
 
     def _play(self, change: Any) -> None:
         """Set the actor's time to the one that has changed in the browser, or here."""
-        series = None if self._actor is None else self._actor.series
-        if series is None or change.new is None or self._shown() is None:
+        player = None if self._actor is None else self._actor.player
+        if player is None or change.new is None or self._shown() is None:
             return
-        if series.nearest(change.new) != series.nearest(self._actor.time):
-            self._actor.time = change.new
+        if player.collection.nearest(change.new) != player.step:
+            player.time = change.new
             self._draw_later()
 
     def _draw_later(self) -> None:
@@ -106,8 +106,8 @@ class PlotterWidget(VDIWidget):
             self.camera = camera
         if self._known != state_of(renderer):
             self._take(renderer, scene_of(plotter, None, follow=True))
-        elif self._actor is not None and self._actor.series is not None:
-            self.time = self._actor.time
+        elif self._actor is not None and self._actor.player is not None:
+            self.time = self._actor.player.time
 
     def _take(self, renderer: Any, scene: ShownScene) -> None:
         """Take a scene, and send what of it is another."""
@@ -121,8 +121,8 @@ class PlotterWidget(VDIWidget):
         self.clipping_planes = scene.planes
         if self._look != (look := look_of(actor)):
             self._look, self.vdi = look, scene.shown
-        if actor.series is not None:
-            self.time = actor.time
+        if actor.player is not None:
+            self.time = actor.player.time
 
     def _still(self) -> str:
         return png(self._picture)

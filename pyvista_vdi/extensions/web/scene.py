@@ -75,12 +75,13 @@ def scene_of(plotter: Any, where: str | None, *, follow: bool = False) -> ShownS
 
     # Sort what is drawn into VDIs, meshes and what VTK draws into the picture
     visible = [prop for prop in renderer.GetViewProps() if prop.GetVisibility()]
-    visible.sort(key=lambda p: is_vdi(p) and not (p.series or p.vdi_set))
+    visible.sort(key=lambda p: is_vdi(p) and not p.collection)
     for prop in visible:
         missing: list[str] = []
         if is_vdi(prop):
-            matrix, several = as_array(prop.GetMatrix()), prop.series or prop.vdi_set
-            vdi = prop.vdi if follow else prop.GetMapper().driver.vdi_of_view(renderer, matrix)
+            matrix, several, mapper = as_array(prop.GetMatrix()), prop.collection, prop.GetMapper()
+            anew = mapper.GetSource() is not None and mapper.GetRegenerate() != "never"
+            vdi = prop.regenerate() if anew and not follow else prop.vdi
             if vdi is None:
                 continue
             placed: dict[str, Any] = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
@@ -135,7 +136,7 @@ def state_of(renderer: Any) -> Any:
 
 def look_of(actor: Any) -> Any:
     """Return what decides which VDIs an actor shows."""
-    several = actor.series or actor.vdi_set
+    several = actor.collection
     if several is None:
         return actor.vdi
     classified_at = None if several.value_range is None else actor.GetProperty().GetMTime()

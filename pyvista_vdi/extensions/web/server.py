@@ -22,9 +22,10 @@ from pyvista_vdi.errors import Cancelled, InvalidArgumentError, MissingDependenc
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.page import html_page
 from pyvista_vdi.extensions.web.source import BadMessageError, Source, Wish, wish_after
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.model.types import DeviceLike, MemoryLike, OcclusionLike, VolumeLike
+from pyvista_vdi.model.types import DeviceLike, OcclusionLike, VolumeLike
 
 try:
     from aiohttp import WSCloseCode, WSMsgType, web
@@ -290,7 +291,7 @@ def serve(
     max_supersegments: int = 8,
     sample_distance: float | None = None,
     ambient_occlusion: OcclusionLike | None = None,
-    memory_limit: MemoryLike | None = None,
+    memory_limit: int | None = None,
     max_clients: int = 256,
     device: DeviceLike | None = None,
     wait: bool = True,
@@ -345,7 +346,7 @@ def serve(
     options = GenerationOptions.checked(
         max_supersegments=max_supersegments,
         sample_distance=sample_distance,
-        ambient_occlusion=ambient_occlusion,
+        ambient_occlusion=AmbientOcclusion.from_any(ambient_occlusion),
         memory_limit=memory_limit,
         precision="8-byte",
     )

@@ -98,12 +98,11 @@ def file_of(
         first = write_several(stream, shown, progress=progress, **options)
         return stream.getvalue(), first
     kept = shown.with_precision(precision)
-    lists = kept.lists
     if isinstance(kept, DeferredVDI):
         begun = kept.classified() if seen is None else seen
-        lists = copy.copy(lists)
-        lists.metadata = {**kept.metadata, "transfer_function": begun.metadata["transfer_function"]}
-    write_to(stream, lists, DEFLATE, level, progress)
+        kept = copy.copy(kept)
+        kept.metadata = {**kept.metadata, "transfer_function": begun.metadata["transfer_function"]}
+    write_to(stream, kept, DEFLATE, level, progress)
     with zipfile.ZipFile(stream) as archive:
         members = archive.infolist()
     behind = members[2 if members[1].filename == COARSE else 1]

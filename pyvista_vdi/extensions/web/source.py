@@ -21,11 +21,10 @@ from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.extensions.web.shown import bare_file, camera_of, viewer_camera
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.coverage import SLACK, bounds_corners, projected
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
 from pyvista_vdi.model.standard_cases import filling_camera
-from pyvista_vdi.model.view import View
+from pyvista_vdi.model.view import SLACK, View, bounds_corners, projected
 from pyvista_vdi.volume.rays import checked_sample_distance
 
 #: Longest edge of a client's picture, pixels.

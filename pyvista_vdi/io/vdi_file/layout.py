@@ -16,7 +16,7 @@ import numpy as np
 
 from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import VDIFileError
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import Lists
 
 #: Highest version of the format, and the lowest that is read.
 FORMAT_VERSION, LEAST_VERSION = 4, 2
@@ -141,7 +141,7 @@ def layouts(
     }
 
 
-def describe(vdi: VDI, version: int) -> dict[str, Any]:
+def describe(vdi: Lists, version: int) -> dict[str, Any]:
     """Return the entries that all formats share, in their order; ``version`` is the format's."""
     return {
         "format": FORMAT_NAME,

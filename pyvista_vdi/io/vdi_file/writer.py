@@ -30,8 +30,9 @@ from pyvista_vdi.io.vdi_file.layout import (
     layouts,
     to_json,
 )
+from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import DEPTH_CODES, Packed8
-from pyvista_vdi.model.vdi import VDI, length_per_depth, with_arrays
+from pyvista_vdi.model.vdi import VDI, length_per_depth, made_vdi
 from pyvista_vdi.model.whole_file import whole_file
 
 #: The oldest time that ZIP knows; a real one would make equal VDIs differ.
@@ -60,13 +61,13 @@ def write(
     """
     vdi = vdi if precision is None else vdi.with_precision(precision)
     with whole_file(path) as stream:
-        write_to(stream, vdi.lists, compression, level, progress)
+        write_to(stream, vdi, compression, level, progress)
     return Path(os.path.realpath(path))
 
 
 def write_to(
     stream: IO[bytes],
-    vdi: VDI,
+    shown: VDI | DeferredVDI,
     compression: str,
     level: int | None = None,
     progress: Progress | None = None,
@@ -75,10 +76,11 @@ def write_to(
 ) -> None:
     """Write a .vdi file to a stream that can be sought in.
 
-    ``stream``: takes the bytes. ``vdi``, ``compression``, ``level``, ``progress``: as for
+    ``stream``: takes the bytes. ``shown``, ``compression``, ``level``, ``progress``: as for
     :func:`write`; the VDI has the precision to write. ``coarse``: whether a file of version 4
     begins with a coarse level; lists that keep values have none, as these do not mix as media do.
     """
+    vdi, about = shown.lists, getattr(shown, "about", None)
     longest = int(vdi.counts.max())
     kind = next(kind for kind in ("<u1", "<u2", "<u4", "<u8") if longest <= np.iinfo(kind).max)
     counts = vdi.counts.ravel().astype(kind)
@@ -93,9 +95,9 @@ def write_to(
         precision=vdi.precision,
     )
     # Describe them
-    entries = describe(vdi, version)
-    if vdi.kept is not None:
-        entries |= {"format": DEFERRED_NAME, "deferred": vdi.kept}
+    entries = describe(shown, version)
+    if about is not None:
+        entries |= {"format": DEFERRED_NAME, "deferred": about}
     metadata = entries.pop("metadata")
     if version >= 3:
         entries["precision"] = vdi.precision
@@ -109,7 +111,7 @@ def write_to(
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(stored(DESCRIPTION), description)
         shrinks = min(vdi.window_size) >= COARSE_STEP and longest <= DEPTH_CODES
-        if coarse and compression == DEFLATE and shrinks and vdi.kept is None:
+        if coarse and compression == DEFLATE and shrinks and about is None:
             small = coarser(vdi, COARSE_STEP).with_precision("8-byte")
             few = io.BytesIO()
             write_to(few, small, DEFLATE, effort, coarse=False)
@@ -157,7 +159,7 @@ def coarser(vdi: VDI, step: int = 4) -> VDI:
     )
     tau = vdi.optical_depth[rows] * np.repeat(stretch.ravel(), counts)
     arrays = vdi.arrays.take(offsets, rows)._replace(optical_depth=tau.astype(np.float32))
-    return with_arrays(vdi, arrays, camera=camera, window_size=window, metadata={})
+    return made_vdi(arrays, vdi, camera=camera, window_size=window, metadata={})
 
 
 def stored(name: str) -> zipfile.ZipInfo:

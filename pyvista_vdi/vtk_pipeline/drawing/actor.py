@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.collection import RATE, VDICollection
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
@@ -17,6 +17,7 @@ from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkOpenGLShaderProperty,
     vtkVolume,
+    weakly,
 )
 
 
@@ -43,11 +44,16 @@ class VDIActorMethods:
                 f"a VDIActor needs a VDIMapper; got {type(mapper).__name__}: an ordinary volume "
                 "mapper goes behind a vtkVolume"
             )
-        if mapper is not None:
-            mapper.driver.set_actor(self)
+        if mapper is not None and mapper.driver.actor() not in (None, self):
+            raise InvalidArgumentError(
+                "this VDIMapper is already behind another VDIActor: give each actor its own "
+                "(the VDI itself can be shared)"
+            )
         old = self.GetMapper()
-        if isinstance(old, VDIMapperMethods) and old is not mapper:
-            old.driver.leave_actor(self)
+        if isinstance(old, VDIMapperMethods) and old.driver.actor() is self:
+            old.driver.actor = lambda: None
+        if mapper is not None:
+            mapper.driver.actor = weakly(self)
         super().SetMapper(mapper)  # type: ignore[misc]
         # VTK keeps no more than its own part of a mapper, so this observer, which is never called,
         # keeps the rest. The shader property is what VTK frees last of an actor: so the mapper goes
@@ -138,15 +144,22 @@ class VDIActorMethods:
         return None if mapper is None else mapper.driver.values_asked_for()  # type: ignore[no-any-return]
 
     @property
-    def vdi_set(self: Any) -> VDICollection | None:
-        """The set of which the nearest VDI is shown; ``None`` where a single one or a volume is."""
-        return self._collection(times=False)
-
-    def _collection(self: Any, *, times: bool) -> VDICollection | None:
+    def collection(self: Any) -> VDICollection | None:
+        """The series or set that is shown; ``None`` where a single VDI or a volume is."""
         mapper = self.GetMapper()
-        source = None if mapper is None else mapper.driver.input
-        shown = None if source is None else source.collection
-        return shown if shown is not None and (shown.times is not None) == times else None
+        shown = None if mapper is None else mapper.driver.input
+        return None if shown is None else shown.collection
+
+    @property
+    def player(self: Any) -> Any:
+        """What shows the steps of a series: ``time`` and ``step``, which may be set, ``play()``.
+
+        ``None`` where no series is shown. See
+        :class:`pyvista_vdi.extensions.series.shown.SeriesInput`.
+        """
+        mapper = self.GetMapper()
+        shown = None if mapper is None else mapper.driver.input
+        return None if shown is None else shown.player
 
     def _mapper(self: Any) -> Any:
         """Return the mapper; InvalidArgumentError without one."""
@@ -196,7 +209,7 @@ class VDIActorMethods:
             If no renderer of a window shows the actor.
         """
         mapper = self.GetMapper()
-        shown = [] if mapper is None else mapper.driver.renderers()
+        shown = [] if mapper is None else mapper.driver.renderers
         shown = [r for r in shown if r.GetRenderWindow() is not None]
         if not shown:
             raise InvalidArgumentError(
@@ -237,10 +250,13 @@ class VDIActorMethods:
                 "this actor shows VDIs without a volume, which cannot be generated anew: add "
                 "the volume, or set another VDI (actor.vdi = another)"
             )
-        mapper.driver.retry()
+        driver = mapper.driver
+        driver.drop()
+        driver.failed = ()
+        driver.warnings.said.clear()
         matrix = as_array(self.GetMatrix())
-        renderer, shown = mapper.driver.renderer(), mapper.driver.input
-        shown.note_scene(mapper.driver.renderers(), matrix)
+        renderer, shown = driver.renderer(), driver.input
+        shown.note_scene(driver.renderers, matrix)
         if camera is not None:
             source.SetCamera(camera, matrix)
         elif renderer is not None:
@@ -254,103 +270,6 @@ class VDIActorMethods:
     def camera_to_come(self, renderer: Any) -> Any:
         """Return the ``vtkCamera`` of a renderer's next picture."""
         return camera_to_come(renderer)
-
-    # A series: see Input.player
-
-    @property
-    def series(self: Any) -> VDICollection | None:
-        """The series that is shown; ``None`` where a single VDI or a volume is."""
-        return self._collection(times=True)
-
-    @property
-    def time(self: Any) -> float:
-        """Time of the step that is shown; one that is set shows the step nearest to it.
-
-        The step is there in the next frame, whatever it takes to decode. InvalidArgumentError is
-        raised where no series is shown.
-        """
-        return self._player().time  # type: ignore[no-any-return]
-
-    @time.setter
-    def time(self: Any, time: float) -> None:
-        self._player().time = time
-        self.GetMapper().Modified()
-
-    @property
-    def step(self: Any) -> int:
-        """Index of the step that is shown, 0 and up; negative ones that are set are from the end.
-
-        As :attr:`time`.
-        """
-        return self._player().step  # type: ignore[no-any-return]
-
-    @step.setter
-    def step(self: Any, step: int) -> None:
-        self._player().step = step
-        self.GetMapper().Modified()
-
-    @property
-    def playing(self: Any) -> bool:
-        """Whether one step is shown after the other."""
-        mapper = self.GetMapper()
-        shown = None if mapper is None else mapper.driver.input
-        return shown is not None and shown.player is not None and shown.player.playing
-
-    def play(
-        self: Any,
-        rate: float = RATE,
-        *,
-        loop: bool = True,
-        memory_limit: float | str | None = None,
-    ) -> None:
-        """Show one step after the other, from the one that is shown, while the view can be turned.
-
-        Steps are decoded behind the frames, ahead of their time. Those that are not ready when
-        their time comes are left out: time does not wait. In a window without an event loop, as
-        off-screen, the step of the moment is shown whenever the window is drawn; for a movie set
-        :attr:`time` before each frame.
-
-        Parameters
-        ----------
-        rate : float
-            Steps per second.
-        loop : bool
-            Whether the first step follows the last; otherwise that is the end.
-        memory_limit : float or str, optional
-            Bytes that decoded steps may take, or as ``"2 GiB"``; 1 GiB by default. Those that are
-            kept need not be decoded in the next round.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If no series is shown, the rate is none, or the limit no number of bytes.
-        """
-        self._player().play(rate, loop=loop, memory_limit=memory_limit)
-        driver = self.GetMapper().driver
-        renderer = driver.renderer()
-        window = None if renderer is None else renderer.GetRenderWindow()
-        # Before the first frame there is nothing to look at, and that frame looks itself
-        if window is not None and not window.GetNeverRendered():
-            driver.follow(window)
-
-    def pause(self: Any) -> None:
-        """Stay at the step that is shown.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If no series is shown.
-        """
-        self._player().pause()
-
-    def _player(self: Any) -> Any:
-        shown = self._mapper().driver.input
-        if shown is None or shown.player is None:
-            raise InvalidArgumentError(
-                "this actor shows no series, which alone has times: add one (plotter.add_vdi("
-                "pyvista_vdi.read('x.vdis'))), or set it (actor.series = series)"
-            )
-        return shown.player
 
 
 class VDIActor(VDIActorMethods, vtkVolume):

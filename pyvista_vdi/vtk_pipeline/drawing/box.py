@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.model.coverage import bounds_corners
+from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.vtk_pipeline.drawing.screen import fill_viewport
 from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
@@ -64,7 +64,11 @@ class Box(Algorithm):
 
     def connect(self) -> None:
         """Follow what the input is made of, which may be something else by now."""
-        self.SetInputConnection(None if self._shown is None else self._shown.port)
+        port = None if self._shown is None else self._shown.port
+        connected = self.GetNumberOfInputConnections(0) > 0
+        if port is not (self.GetInputConnection(0, 0) if connected else None):
+            self.SetInputConnection(port)
+            self.place(None)  # what fails from the first has no bounds either
 
     def give_components(self, components: int) -> None:
         """Set the voxels' components: VTK asks for four where they are dependent."""

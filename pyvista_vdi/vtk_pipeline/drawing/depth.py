@@ -29,10 +29,10 @@ _GL_DRAW_FRAMEBUFFER_BINDING = 0x8CA6
 
 
 def opaque_depth(frames: Sequence[Frame]) -> Image | None:
-    """Return where the rays of VDIs end in the frame that is being drawn; ``None``: none early.
+    """Return the depth of what may hide VDIs in the frame that is being drawn; ``None``: nothing.
 
-    View depth, float32 (H, W), top row first, world units; inf where nothing is. Nothing is read
-    where nothing opaque is before the VDIs, and outside their rectangles on the screen.
+    Window depth, float32 (H, W), top row first; 1 where nothing is. Nothing is read where nothing
+    opaque is before the VDIs, and outside their rectangles on the screen.
     """
     frame = frames[0]
     rectangles = [r for own in frames if (r := own.rectangle(own.bounds)) is not None]
@@ -54,14 +54,21 @@ def opaque_depth(frames: Sequence[Frame]) -> Image | None:
     if z.min() >= 1.0:
         return None
 
-    # Convert it
-    depth = aligned_empty(frame.size[::-1], np.float32)
-    depth.fill(np.inf)
-    there = depth[frame.size[1] - top : frame.size[1] - bottom, left:right]
-    rows = max(1, _BLOCK // (right - left))
-    for first in range(0, top - bottom, rows):
-        there[first : first + rows] = frame.view_depth(z[::-1][first : first + rows])
+    depth = np.ones(frame.size[::-1], dtype=np.float32)
+    depth[frame.size[1] - top : frame.size[1] - bottom, left:right] = z[::-1]
     return depth
+
+
+def ends_of_rays(frame: Frame) -> Image | None:
+    """Return the view depth at which the rays of a frame end, inf where nothing hides a VDI."""
+    if frame.depth is None:
+        return None
+    ends = aligned_empty(frame.depth.shape, np.float32)
+    rows = max(1, _BLOCK // frame.size[0])
+    for first in range(0, len(ends), rows):
+        z = frame.depth[first : first + rows]
+        ends[first : first + rows] = np.where(z < 1, frame.view_depth(z), np.inf)
+    return ends
 
 
 def _is_before(frames: Sequence[Frame]) -> bool:

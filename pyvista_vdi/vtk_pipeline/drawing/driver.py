@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
-from pyvista_vdi.model.coverage import coverage
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.errors import InvalidVolumeError, VDIError
 from pyvista_vdi.model.render_options import FrameRequest
-from pyvista_vdi.quality.plan import SETTLED, ssim_of
+from pyvista_vdi.model.view import coverage
+from pyvista_vdi.quality.plan import SETTLED
 from pyvista_vdi.quality.rate import FLOOR, reduced
 from pyvista_vdi.quality.view_error import angle_from_generating_view, magnification
 from pyvista_vdi.raycasting.picking import FirstHit, Pick, pick_vdi
@@ -27,13 +28,12 @@ from pyvista_vdi.vtk_pipeline.drawing.depth import opaque_depth
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Matrix, tiled, viewport
 from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Drawn, raycast
 from pyvista_vdi.vtk_pipeline.drawing.overlap import group_of
-from pyvista_vdi.vtk_pipeline.drawing.planner import Planner, number_of
-from pyvista_vdi.vtk_pipeline.drawing.screen import ImageTexture, NoDepth, place_image, show_image
+from pyvista_vdi.vtk_pipeline.drawing.planner import Planner
+from pyvista_vdi.vtk_pipeline.drawing.screen import ImageTexture, NoDepth, place_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.interaction.timer import PERIOD, Timer
 from pyvista_vdi.vtk_pipeline.interaction.window import Window, now
-from pyvista_vdi.vtk_pipeline.vtk import vtkWeakReference, weakly
 
 #: Pictures as coarse as previews that tell what a volume's rays take, of which the fastest counts:
 #: what disturbs one by milliseconds has the volume seem too slow to be drawn.
@@ -50,38 +50,16 @@ class Driver(Planner):
         super().__init__()
         self.box = Box()
         self._window: Callable[[], Window | None] = lambda: None  # of the last frame
-        self._active = vtkWeakReference()  # which renderer is between its start and its end
-        self._followed: list[Callable[[], Any]] = []  # renderers that say so
-        self._trouble: BaseException | None = None  # for raise_trouble
-        self._astray = False  # whether something else than the actor draws
+        self.trouble: BaseException | None = None  # why a frame could not be drawn, the last time
         # What the last frame showed, and by what
         self._last, self._spare = NOTHING, NOTHING.pixels
         self._stand_in = False  # whether that was a volume whose VDI is to come
         self._texture, self._no_depth = ImageTexture(), NoDepth()
-        self._counted = self._generation = 0  # the VDI that was shown last, and how many were
+        self._counted: Any = None  # the VDI that was shown last, weakly
+        self._generation = 0  # how many were
         self._timer = Timer(self._tick)
 
     # What is drawn, and how
-
-    def set(self, **settings: Any) -> bool:
-        """Keep what a user sets; whether it is another value."""
-        before, self.settings = self.settings, replace(self.settings, **settings)
-        return self.settings != before
-
-    def set_actor(self, actor: Any) -> None:
-        """Remember whose matrix and renderers count."""
-        other = self._actor()
-        if other is not None and other is not actor:
-            raise InvalidArgumentError(
-                "this VDIMapper is already behind another VDIActor: give each actor its own "
-                "(the VDI itself can be shared)"
-            )
-        self._actor = weakly(actor)
-
-    def leave_actor(self, actor: Any) -> None:
-        """Forget that actor, if it is this one."""
-        if self._actor() is actor:
-            self._actor = lambda: None
 
     def set_input(self, source: Input | None) -> None:
         """Draw another VDI, and show its bounds to VTK at once."""
@@ -91,6 +69,7 @@ class Driver(Planner):
             driver = weak()
             if driver is not None:
                 driver.box.connect()
+                driver.follow()
 
         if self.input is not None:
             self.input.watch(None)
@@ -101,12 +80,6 @@ class Driver(Planner):
             source.watch(changed)
         self.box.show(source)
 
-    def retry(self) -> None:
-        """Try again what failed before, and give up what is being made in the background."""
-        self.drop()
-        self.failed = ()
-        self.warnings.forget()
-
     def release(self) -> None:
         """Free textures, images and what devices hold, and end what goes on; a frame begins anew.
 
@@ -116,14 +89,15 @@ class Driver(Planner):
         if self._volume is not None:
             held.append(self._volume.request.volume)
         if isinstance(self.input, SourceInput):
-            self.input.keep_lights(self.renderers())
+            self.input.keep_lights(self.renderers)
         self._timer.stop()
         if self.input is not None:
             self.input.rest()
         self.forget()
-        self.background.close()
+        self.worker.join()
         release_from_devices(held)
         self._texture.release()
+        self._texture = ImageTexture()  # it holds the image as well
         self._no_depth.release()
         self._last, self._spare = replace(self._last, image=NOTHING.image, key=None), None
 
@@ -131,63 +105,58 @@ class Driver(Planner):
 
     def begin(self, mapper: Any) -> None:
         """Raycast and upload the image for the frame that has just begun."""
-        actor, renderer = self._actor(), self.renderer()
+        actor, renderer = self.actor(), self.renderer()
         if renderer is None or not _is_drawing(renderer):
             self.warnings.warn(
                 "VDIMapper draws only behind its own VDIActor: use VDIActor in place of vtkVolume, "
                 "also for copies (VDIActor().ShallowCopy(actor))"
             )
-            self._astray = True
-            self.box.place((0.0,) * 6)  # nothing is seen of it
-            return
-        origin, size = viewport(renderer)
-        if min(size) == 0:  # beside the tile of a picture that is drawn
             return
         # VTK asks for four where the actor's property says that they are dependent
         components = 1 if actor.GetProperty().GetIndependentComponents() else 4
         if self.box.components != components:
             self.box.give_components(components)
-        window = renderer.GetRenderWindow()
+        frame = Frame.current(renderer, actor, mapper)
+        if frame is None:  # beside the tile of a picture that is drawn
+            return
+        window, vtk_window = frame.window, renderer.GetRenderWindow()
+        self._window = weakref.ref(window)
         # A selection draws numbers where the last frame showed something
         if renderer.GetSelector() is None:
-            show_image(actor, renderer)
             with suppress(VDIError):  # which what is drawn says
                 self.box.Update()
-            self._last = self._guarded(self._paint, mapper, renderer) or self._last
+            self._last = self._guarded(self._paint, frame) or self._last
         drawn = self._last
-        Window.of(window).pace.frame.preview |= drawn.preview
+        window.pace.frame.preview |= drawn.preview
         # Pixels are interpolated, but not where the neighbours are another actor's
         smooth = drawn.preview and not drawn.joint
-        unit = self._texture.show(window, drawn.image, smooth=smooth)
-        place_image(actor, unit, origin, size)
-        self._no_depth.show(window, mapper)
+        unit = self._texture.show(vtk_window, drawn.image, smooth=smooth)
+        place_image(actor, unit, frame.origin, frame.full_size)
+        self._no_depth.show(vtk_window, mapper)
         self.follow(window)
 
     def end(self) -> None:
         """Release the texture units."""
-        if self._astray:
-            self._astray = False
-            self.box.Modified()  # it has its bounds again
         self._texture.let_go()
         self._no_depth.let_go()
         if self.seen is not None and self.seen.hand:
-            self.background.pause(SETTLED)  # from now on
+            self.worker.pause(SETTLED)  # from now on
 
-    def _paint(self, mapper: Any, renderer: Any) -> Drawn:
+    def _paint(self, frame: Frame) -> Drawn:
         """Return the frame's image: the last one, or a new one."""
-        frame = self._seen_in(Frame.current(renderer, self._actor(), mapper))
-        self._stand_in = frame is not None and frame.stand_in
-        if frame is None:
+        shown = self._seen_in(frame)
+        self._stand_in = shown is not None and shown.stand_in
+        if shown is None:
             return self._last
-        window = frame.window
-        if frame.volume is None and len(window.shown_in(renderer)) > 1:
+        frame, window = shown, shown.window
+        if frame.volume is None and len(window.shown_in(frame.renderer)) > 1:
             part = group_of(frame).part(frame)
             if part is not None:
                 return part
         frame = replace(frame, depth=opaque_depth([frame]))
         # However the frame is to be: where it is there, full costs nothing
         share = 1 / self.settings.image_distance**2
-        for size in (reduced(frame.full_size, share), self.preview_size(frame)):
+        for size in dict.fromkeys((reduced(frame.full_size, share), self.preview_size(frame))):
             sized = frame.coarser(size)
             if self._last.shows(sized):
                 return self._last
@@ -199,24 +168,25 @@ class Driver(Planner):
         window.pace.drawn(sized.size, sized.full_size, seconds, sized.way, sized.effort)
         # A volume's first picture has kernels compiled and voxels sent to the device
         if sized.volume is None or sized.volume.pictures > 1:
-            self.costs = self.costs.took(sized.way, sized.angle, sized.covered, seconds)
+            of = (sized.way, sized.angle, sized.covered_by(sized.bounds), seconds)
+            self.costs = self.costs.took(*of, gpu=not get_runtime(self.device).is_cpu)
         elif self.seen is not None and self.costs.volume is None:
             coarse, taken = frame.coarser(reduced(frame.full_size, FLOOR)), []
             for _ in range(_TRIALS):
                 began = now()
                 raycast(coarse, self.device, None)
                 taken.append(now() - began)
-            self.costs = self.costs.took("volume", 0.0, coarse.covered, min(taken))
+            pixels = coarse.covered_by(coarse.bounds)
+            self.costs = self.costs.took("volume", 0.0, pixels, min(taken))
         return drawn
 
     def _seen_in(self, frame: Frame) -> Frame | None:
         """Return the frame of what is to be seen, and show its bounds to VTK."""
-        self._window = weakref.ref(frame.window)
         shown = self.showing(frame)
         if shown is not None:
             self.box.place(shown.bounds)
-            if shown.volume is None and shown.number != self._counted:
-                self._counted = shown.number
+            if shown.volume is None and shown.seen != self._counted:
+                self._counted = shown.seen
                 self._generation += 1
         return shown
 
@@ -226,15 +196,16 @@ class Driver(Planner):
         if frame.full or not settings.previews:
             window.knows(renderer.GetActiveCamera())
         elif not window.takes_picture(renderer):
-            each = self.costs.volume
-            known = frame.volume is not None and each is not None
+            each, expected = self.costs.volume, None
+            if frame.volume is not None and each is not None:
+                expected = each * frame.covered_by(frame.bounds) + self.costs.fixed
             share = window.pace.share(
                 window.rate(settings),
                 math.prod(frame.full_size),
                 min(1.0, 1 / frame.mapper.GetMaximumImageSampleDistance() ** 2),
                 frame.way,
                 effort=frame.effort,
-                expected=each * frame.covered if known else None,  # type: ignore[operator]
+                expected=expected,
             )
         return reduced(frame.full_size, min(share, 1 / settings.image_distance**2))
 
@@ -244,70 +215,60 @@ class Driver(Planner):
         Never raises. What is out of the picture is not brought up to date.
         """
 
-        def in_picture(mapper: Any, renderer: Any) -> Frame | None:
+        def in_picture(_: Any) -> Frame | None:
             bounds = None if self.input is None else self.input.bounds()
-            frame = Frame.current(renderer, self._actor(), mapper, matrix)
-            if bounds is None or frame.rectangle(bounds) is None:
+            frame = Frame.current(renderer, self.actor(), mapper, matrix)
+            if bounds is None or frame is None or frame.rectangle(bounds) is None:
                 return None
+            self._window = weakref.ref(frame.window)
             seen = self._seen_in(frame)
             return None if seen is None or seen.volume is not None else seen
 
-        return self._guarded(in_picture, mapper, renderer)  # type: ignore[no-any-return]
+        return self._guarded(in_picture, None)  # type: ignore[no-any-return]
 
     # Between frames
 
-    def follow(self, window: Any) -> None:
+    def follow(self, window: Window | None = None) -> None:
         """Start the event loop's timer, if something goes on and no hand moves."""
-        if self.goes_on and not Window.of(window).moving:
+        window = self._window() if window is None else window
+        if window is not None and self.goes_on and not window.moving:
             period = PERIOD if self.input is None else self.input.period or PERIOD
-            self._timer.start(window.GetInteractor(), period)
+            self._timer.start(window.interactor, period)
 
     def _tick(self) -> None:
         """Look, from the event loop, at what goes on, and have shown what is new."""
         window = self._window()
         if window is None or window.drawing:
             return
-        swapped = self.advance()
-        if not swapped:
-            self.begin_at_rest(window)
-        if not self.goes_on:
+        another = self.advance() or (self.unsettled and now() - self._moved_at >= SETTLED)
+        if window.moving or not (another or self.goes_on):
             self._timer.stop()
         interactor = self._timer.interactor()
-        if swapped and interactor is not None:
+        if another and interactor is not None:
             interactor.Render()
 
     # Errors in a frame
 
-    def _guarded(self, draw: Callable[[Any, Any], Any], mapper: Any, renderer: Any) -> Any:
+    def _guarded(self, draw: Callable[[Any], Any], frame: Any) -> Any:
         """Return what a part of drawing returns, or ``None`` and say what went wrong."""
         try:
-            return draw(mapper, renderer)
-        except KeyboardInterrupt as interrupt:
-            self.warnings.warn(
-                "generating the VDI was interrupted: what was shown stays; call "
-                "actor.regenerate() to try again"
-            )
-            self._note(interrupt)
-        except Exception as error:  # VTK would swallow it
+            return draw(frame)
+        except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
             if isinstance(error, InvalidVolumeError):  # as VTK's mappers: there is nothing to see
                 self._last = NOTHING
                 with suppress(VDIError):
                     self.box.place(None if self.input is None else self.input.bounds())
-            self.warnings.warn(f"the VDI cannot be drawn: {type(error).__name__}: {error}", error)
-            self._note(error)
-        return None
-
-    def raise_trouble(self) -> None:
-        """Raise, once, what a frame could not be drawn for: VTK's renderer lets nothing through."""
-        trouble, self._trouble = self._trouble, None
-        if trouble is not None:
-            raise trouble
-
-    def _note(self, error: BaseException) -> None:
-        """Keep the first error for :meth:`raise_trouble`, without the frames that it came from."""
-        if self._trouble is None:
-            self._trouble = error.with_traceback(None)
+            message = f"the VDI cannot be drawn: {type(error).__name__}: {error}"
+            if isinstance(error, KeyboardInterrupt):
+                message = (
+                    "generating the VDI was interrupted: what was shown stays; call "
+                    "actor.regenerate() to try again"
+                )
+            self.warnings.warn(message, error)
+            # Without the frames that it came from, which hold buffers
+            self.trouble = error.with_traceback(None)
             error.__cause__ = error.__context__ = None
+        return None
 
     # Status and picks
 
@@ -317,7 +278,7 @@ class Driver(Planner):
         vdi = None if self.input is None else self.input.last()
         player = None if self.input is None else self.input.player
         shown = None if vdi is None or view is None else (vdi, view.camera, view.size)
-        number = None if vdi is None else number_of(vdi)
+        known = None if vdi is None else self.estimate
         return VDIStatus(
             mode="none" if last.full_size is None else "preview" if last.preview else "full",
             samples=0 if last.full_size is None else last.image.size // 4,
@@ -326,8 +287,8 @@ class Driver(Planner):
             angle=None if shown is None else angle_from_generating_view(*shown[:2]),
             magnification=None if shown is None else magnification(*shown),
             coverage=None if shown is None else coverage(*shown),
-            ssim=ssim_of(self.pictures, self.estimate, number, view),
-            progress=self.background.progress,
+            ssim=known.ssim if known is not None and known.vdi() is vdi else None,
+            progress=self.worker.progress if self.making is not None else None,
             generation=self._generation,
             vdi=vdi,
             stand_in=self._stand_in,
@@ -343,10 +304,10 @@ class Driver(Planner):
             return None
         placed = shown[0]
         frame = Frame.current(renderer, placed.actor, placed.mapper, placed.matrix, drawing=False)
-        vdi = self.vdi_to_pick(frame)
-        if vdi is None:
+        vdi = None if frame is None else self.vdi_to_pick(frame)
+        if frame is None or vdi is None:
             return None
-        seen = frame.showing(vdi, number_of(vdi))
+        seen = frame.showing(vdi)
         (left, bottom), request = seen.origin, FrameRequest(seen.camera, seen.size, seen.options)
         hit = FirstHit.of(self.settings.picking_opacity, accumulated=True)
         picked = pick_vdi(vdi, request, (int(x) - left, int(y) - bottom), hit, kept)
@@ -362,29 +323,19 @@ class Driver(Planner):
     # Renderers
 
     def renderer(self) -> Any:
-        """Return the renderer that is drawing the actor; ``None`` if it has none."""
-        renderers = self.renderers()
-        if len(renderers) > 1:
-            for candidate in renderers:
-                self._follow_renderer(candidate)
-            active = self._active.Get()
-            if active in renderers:
-                return active
-            # The first frame that shows the actor twice: tell them apart by their windows, of which
-            # one is drawing, and by their viewports
-            drawing = [r for r in renderers if _is_drawing(r)]
-            viewports = [r for r in drawing if viewport(r) == tiled(r)]
-            renderers = viewports or drawing or renderers
-        return renderers[0] if renderers else None
-
-    def _follow_renderer(self, renderer: Any) -> None:
-        """From now on, know whether a renderer is between its StartEvent and EndEvent."""
-        if any(known() is renderer for known in self._followed):
-            return
-        self._followed.append(weakly(renderer))
-        active = self._active  # a VTK weak reference: no cycle through the observer
-        renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
-        renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
+        """Return the renderer that is drawing the actor, or would; ``None`` if it has none."""
+        renderers = self.renderers
+        if len(renderers) < 2:
+            return renderers[0] if renderers else None
+        drawing = [each for each in renderers if _is_drawing(each)]
+        for each in drawing:
+            window = Window.of(each.GetRenderWindow())
+            window.shown_in(each)  # from now on it is known which one draws
+            if window.active.Get() is each:
+                return each
+        # The first frame that shows the actor twice: tell them apart by their viewports
+        there = (each for each in drawing if viewport(each) == tiled(each))
+        return next(there, (drawing or renderers)[0])
 
 
 def _is_drawing(renderer: Any) -> bool:

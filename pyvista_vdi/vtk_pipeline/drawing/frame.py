@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+import weakref
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.coverage import bounds_corners
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.costs import RenderMode, rise
+from pyvista_vdi.model.view import bounds_corners
+from pyvista_vdi.quality.costs import RenderMode
 from pyvista_vdi.quality.view_error import angle_from_generating_view
-from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, renderer_view
+from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, renderer_view, size_of
 from pyvista_vdi.vtk_pipeline.interaction.window import Window
 
 Matrix = NDArray[np.float64]
@@ -42,25 +42,25 @@ class Frame:
     camera: Camera  # its model transform includes the actor's matrix
     to_view: Matrix  # world coordinates to that camera's world, (4, 4)
     projection: Matrix  # its rows 2 and 3: view space to depth and denominator, (2, 4)
-    renderer: Any = None
-    actor: Any = None
-    mapper: Any = None
-    full_size: tuple[int, int] = (0, 0)  # of the viewport; the image of a preview is smaller
-    view: View | None = None  # the renderer's, between the two eyes of a stereo pair
-    model_transform: Any = None  # the actor's matrix, (4, 4)
+    renderer: Any
+    window: Window
+    actor: Any
+    mapper: Any
+    full_size: tuple[int, int]  # of the viewport; the image of a preview is smaller
+    view: View  # the renderer's, between the two eyes of a stereo pair
+    model_transform: Matrix  # the actor's matrix, (4, 4)
     vdi: VDI | None = None  # what is seen: see showing()
     volume: Any = None  # the VolumePicture that is seen in place of a VDI
-    number: int = 0  # by which what is seen is known: a VDI is not held for it
-    angle: float = 0.0  # between the view and that of the VDI, degrees; 0 for a volume
+    seen: Any = None  # a weak reference to that, by which it is known
     effort: float = 1.0  # what a ray is expected to take over one from the VDI's own view
+    angle: float = 0.0  # between the view and that of the VDI, degrees; 0 for a volume
     parts: tuple[tuple[VDI, float], ...] = ()  # what the picture is blended of, with weights
-    blend: tuple[tuple[int, float], ...] = ()  # the same by numbers
     lit_from: Camera | None = None  # whose light falls on a shaded volume, in place of the VDI's
     full: bool = True  # whether every pixel gets a ray
     stand_in: bool = False  # whether the volume stands in for a VDI to come
     bounds: tuple[float, ...] = ()  # of what is seen, model frame
     options: RenderOptions = field(default_factory=RenderOptions)  # planes in the camera's world
-    depth: Image | None = None  # view depth at which rays end, float32 (H, W), top row first
+    depth: Image | None = None  # window depth of what hides it, float32 (H, W), top row first
 
     @classmethod
     def current(
@@ -71,12 +71,14 @@ class Frame:
         matrix: Matrix | None = None,
         *,
         drawing: bool = True,
-    ) -> Frame:
+    ) -> Frame | None:
         """Read the frame that ``renderer`` is drawing, or between two would draw.
 
-        ``matrix`` is where an actor stands, (4, 4).
+        ``matrix`` is where an actor stands, (4, 4). ``None`` where nothing is to be drawn.
         """
         (x, y), (width, height) = viewport(renderer) if drawing else tiled(renderer)
+        if min(width, height) == 0:
+            return None
         vtk_camera = renderer.GetActiveCamera()
         aspect = renderer.GetTiledAspectRatio()
         # Not GetCompositeProjectionTransformMatrix: that one turns stereo off
@@ -92,35 +94,36 @@ class Frame:
             view = renderer_view(renderer, matrix)
         except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
             view = View(camera, size)
-        of = (renderer, actor, mapper, size, view, matrix)
+        of = (renderer, Window.of(renderer.GetRenderWindow()), actor, mapper, size, view, matrix)
         return cls(size, (x, y), camera, to_view, projection[2:], *of)
 
     @property
-    def window(self) -> Window:
-        """The window that it is a frame of."""
-        return Window.of(self.renderer.GetRenderWindow())
+    def seen_from(self) -> tuple[Any, tuple[int, int], Matrix]:
+        """What the renderer sees the actor by: its camera, its size and the actor's matrix."""
+        return self.renderer.GetActiveCamera(), size_of(self.renderer), self.model_transform
 
-    def showing(self, seen: Any, number: int) -> Frame:
+    def showing(self, seen: Any, **known: Any) -> Frame:
         """Return the frame of this VDI, or volume, with all that its mapper says of its looks."""
-        settings = self.mapper.driver.settings
+        settings, costs = self.mapper.driver.settings, self.mapper.driver.costs
         options = RenderOptions(
             clipping_planes=self._clipping_planes(seen.bounds),
             cropping=self.mapper,
             opacity_multiplier=settings.opacity_multiplier,
             transmittance_cutoff=settings.transmittance_cutoff,
         )
-        known: dict[str, Any] = {"number": number, "bounds": seen.bounds, "options": options}
+        known |= {"seen": weakref.ref(seen), "bounds": seen.bounds, "options": options}
         if not isinstance(seen, VDI):
             return replace(self, volume=seen, **known)
-        assert self.view is not None
         angle = angle_from_generating_view(seen, self.view.camera)
-        return replace(self, vdi=seen, angle=angle, effort=rise(angle), **known)
+        return replace(self, vdi=seen, angle=angle, effort=costs.rise(angle), **known)
 
     @property
     def key(self) -> Any:
         """What its image is known by, but for the depth; the quality is in it as the two sizes."""
-        of = (self.way, self.number, self.camera, self.size, self.full_size, self.options)
-        return (*of, self.lit_from, self.blend)
+        blend = tuple((weakref.ref(vdi), weight) for vdi, weight in self.parts)
+        of = (self.seen, self.camera, self.size, self.full_size, self.options)
+        numbers = None if self.depth is None else self.projection.tobytes()
+        return (*of, self.lit_from, blend, numbers)
 
     @property
     def way(self) -> RenderMode:
@@ -139,7 +142,11 @@ class Frame:
         (width, height), (wide, high) = self.size, size
         stretch = np.diag([(wide / high) / (width / height), 1.0, 1.0, 1.0])
         camera = self.camera.replace(model_transform=stretch @ self.camera.model_transform)
-        depth = None if self.depth is None else sampled(self.depth, size)
+        depth = self.depth
+        if depth is not None:
+            # The nearest: between a mesh and what is behind it nothing is
+            edges = zip(size[::-1], depth.shape, strict=True)
+            depth = depth[np.ix_(*((2 * np.arange(n) + 1) * full // (2 * n) for n, full in edges))]
         frame = replace(self, size=size, camera=camera, to_view=stretch @ self.to_view, depth=depth)
         if not self.bounds:
             return frame
@@ -153,30 +160,18 @@ class Frame:
         volumes end there.
         """
         rows: list[list[float]] = []
-        planes = self.mapper.GetClippingPlanes()
-        inverse_transpose = np.linalg.inv(self.to_view[:3, :3]).T
-        for i in range(planes.GetNumberOfItems() if planes is not None else 0):
-            plane = planes.GetItem(i)
-            origin = self.to_view[:3, :3] @ plane.GetOrigin() + self.to_view[:3, 3]
-            rows.append([*origin, *(inverse_transpose @ plane.GetNormal())])
+        if planes := planes_of(self.mapper):
+            table, turn = np.array(planes), self.to_view[:3, :3]
+            origins = table[:, :3] @ turn.T + self.to_view[:3, 3]
+            rows = np.hstack([origins, table[:, 3:] @ np.linalg.inv(turn)]).tolist()
         nearest, farthest = self.depths_of(bounds)
-        near, far = (float(d) for d in self.view_depth(np.array([0.0, 1.0]), background=False))
+        near, far = (float(d) for d in self.view_depth(np.array([0.0, 1.0])))
         slack = _PLANE_SLACK * max(abs(nearest), abs(farthest))
         if near > nearest + slack:
             rows.append([0, 0, -near, 0, 0, -1])
         if far < farthest - slack:
             rows.append([0, 0, -far, 0, 0, 1])
         return rows
-
-    def world_options(self) -> RenderOptions:
-        """Return the options with the planes in world coordinates: for the estimate of an error."""
-        if not self.options.clipping_planes:
-            return self.options
-        planes = np.array(self.options.clipping_planes)
-        origins = np.column_stack([planes[:, :3], np.ones(len(planes))])
-        origins = origins @ np.linalg.inv(self.to_view).T
-        world = np.hstack([origins[:, :3], planes[:, 3:] @ self.to_view[:3, :3]])
-        return self.options.replace(clipping_planes=world)
 
     def depths_of(self, bounds: tuple[float, ...]) -> tuple[float, float]:
         """Return the least and the largest view depth of a box in the model frame."""
@@ -199,27 +194,24 @@ class Frame:
             return None
         return np.stack([low, high])
 
-    @cached_property
-    def covered(self) -> float:
-        """How many of the image's pixels the bounds may be seen in."""
-        rectangle = self.rectangle(self.bounds)
+    def covered_by(self, bounds: tuple[float, ...]) -> float:
+        """Return how many of the image's pixels bounds may be seen in."""
+        rectangle = self.rectangle(bounds)
         if rectangle is None:
             return 0.0
         low, high = np.clip(rectangle, 0, self.size)
         return float(np.prod(high - low))
 
-    def view_depth(self, z: NDArray[Any], *, background: bool = True) -> NDArray[Any]:
-        """Convert window depth, 0 (near) to 1 (far), to view depth in world units.
+    def view_depth(self, z: NDArray[Any]) -> NDArray[Any]:
+        """Convert window depth, 0 (near) to 1 (far), to view depth in world units, of its dtype.
 
-        Where z is 1 nothing was drawn: with ``background`` its depth is infinite. With rows p and
-        q of the projection matrix, normalised depth is n = (p_2 Z' + p_3) / (q_2 Z' + q_3) at view
-        coordinate Z' = -Z, in perspective as well as in parallel projection; solved for Z' in
-        float64.
+        With rows p and q of the projection matrix, normalised depth is
+        n = (p_2 Z' + p_3) / (q_2 Z' + q_3) at view coordinate Z' = -Z, in perspective as well as in
+        parallel projection; solved for Z' by 1 - z, which is exact where float32 is finest.
         """
-        n = 2.0 * z.astype(np.float64) - 1.0
-        (p2, p3), (q2, q3) = self.projection[:, 2:]
-        depth = -(p3 - n * q3) / (n * q2 - p2)
-        return np.where(z >= 1.0, np.inf, depth) if background else depth
+        (p2, p3), (q2, q3) = self.projection[:, 2:].tolist()
+        w = 1 - z
+        return (q3 - p3 - 2 * q3 * w) / (q2 - p2 - 2 * q2 * w)
 
 
 def consumers(prop: Any) -> list[Any]:
@@ -232,6 +224,13 @@ def consumers(prop: Any) -> list[Any]:
             consumer for consumer in found if consumer.IsA("vtkProp") and consumer not in props
         ]
     return found
+
+
+def planes_of(mapper: Any) -> list[list[float]]:
+    """Return origin and normal of each clipping plane of a mapper, world coordinates."""
+    planes = mapper.GetClippingPlanes()
+    there = () if planes is None else map(planes.GetItem, range(planes.GetNumberOfItems()))
+    return [[*plane.GetOrigin(), *plane.GetNormal()] for plane in there]
 
 
 def viewport(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -247,18 +246,6 @@ def tiled(renderer: Any) -> tuple[tuple[int, int], tuple[int, int]]:
     width, height, x, y = [0], [0], [0], [0]
     renderer.GetTiledSizeAndOrigin(width, height, x, y)
     return (x[0], y[0]), (width[0], height[0])
-
-
-def sampled(depth: Image, size: tuple[int, int]) -> Image:
-    """Return the depth nearest to the centre of each pixel of a coarser image, float32 (H, W).
-
-    Depths must not be averaged: between a mesh and what is behind it nothing is.
-    """
-    rows, columns = (
-        ((2 * np.arange(n) + 1) * full) // (2 * n)
-        for n, full in zip(size[::-1], depth.shape, strict=True)
-    )
-    return np.ascontiguousarray(depth[np.ix_(rows, columns)])
 
 
 def depths_of(to_view: Matrix, bounds: tuple[float, ...]) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from pyvista_vdi.raycasting.multi_vdi import blended
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import picture_room, raycast_medium, raycast_volume
+from pyvista_vdi.vtk_pipeline.drawing.depth import ends_of_rays
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Image
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 
@@ -102,7 +103,7 @@ class Drawn:
     image: Image  # premultiplied RGBA, (H, W, 4), top row first
     full_size: tuple[int, int] | None = None  # the viewport's; None before the first image
     key: Any = None  # all that it depends on, but for the depth
-    depth: Image | None = None  # where its rays ended
+    depth: Image | None = None  # that ended its rays
     joint: bool = False  # a part of a picture that other actors show the rest of
     way: RenderMode = "vdi"  # what was raycast
     pixels: Image | None = None
@@ -114,10 +115,8 @@ class Drawn:
 
     def shows(self, frame: Frame) -> bool:
         """Whether this is the image of exactly this frame."""
-        if self.key != frame.key:
-            return False
-        a, b = self.depth, frame.depth
-        return a is b if a is None or b is None else np.array_equal(a, b)
+        a, b = self.depth, frame.depth  # by their keys both have one, or neither has
+        return self.key == frame.key and (a is None or b is None or np.array_equal(a, b))
 
 
 #: What a frame shows of which nothing can be drawn.
@@ -126,12 +125,15 @@ NOTHING = Drawn(np.zeros((1, 1, 4), dtype=np.float32))
 
 def raycast(frame: Frame, device: object, pixels: Image | None) -> Drawn:
     """Return the image of a frame, in memory that is given where that is large enough."""
-    width, height = frame.size
-    # Fresh memory costs a page fault for every 4096 bytes that are written
+    width, height = size = frame.size
+    # Fresh memory costs a page fault for every 4096 bytes that are written, and a GPU copies into
+    # what is page-locked in half the time
     if pixels is None or pixels.size < width * height * 4:
-        pixels = aligned_empty(width * height * 4, np.float32)
+        runtime = get_runtime(device)
+        empty = aligned_empty if runtime.is_cpu else runtime.pinned
+        pixels = empty((width * height * 4,), np.dtype(np.float32))
     out = pixels[: height * width * 4].reshape(height, width, 4)
-    request = FrameRequest(frame.camera, frame.size, frame.options, frame.depth, device, out)
+    request = FrameRequest(frame.camera, size, frame.options, ends_of_rays(frame), device, out)
     if frame.volume is not None:
         image = frame.volume.picture(request, frame.lit_from)
     elif frame.parts:

@@ -26,13 +26,12 @@ COARSEST = 4.0
 def _on_start(mapper: Any, event: str) -> None:
     driver = mapper.driver
     driver.begin(mapper)
-    driver.box.begin(driver.actor)
+    driver.box.begin(driver.actor())
 
 
 def _on_end(mapper: Any, event: str) -> None:
-    driver = mapper.driver
-    driver.end()
-    driver.box.end()
+    mapper.driver.end()
+    mapper.driver.box.end()
 
 
 @with_settings
@@ -40,43 +39,35 @@ def _on_end(mapper: Any, event: str) -> None:
 class VDIMapperMethods:
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
-    _driver: Driver | None = None
+    #: What draws; made with the mapper, before which PyVista's constructor sets some settings.
+    driver: Any = None
 
     def _become_vdi_mapper(self: Any) -> None:
         """Install proxy and observers; to be called once, from ``__init__``."""
-        self._driver = Driver()
+        self.driver: Driver = Driver()
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)
         super().SetScalarModeToUsePointData()  # type: ignore[misc]
-        super().SetInputConnection(self._driver.box.GetOutputPort())  # type: ignore[misc]
+        super().SetInputConnection(self.driver.box.GetOutputPort())  # type: ignore[misc]
         # Plain functions: they get the mapper from VTK and hold nothing
         self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
         self.AddObserver("VolumeMapperRenderEndEvent", _on_end)
 
-    @property
-    def driver(self) -> Driver:
-        """What draws; made with the mapper."""
-        assert self._driver is not None
-        return self._driver
-
     def own_source(self, what: str) -> VDISource:
-        """Return the source, which no other mapper draws from now on.
+        """Return the source.
 
         Raises
         ------
         UnsupportedError
             If there is none; ``what`` says what cannot be changed.
         """
-        source, shown = self.GetSource(), self.driver.input
-        if source is None or not isinstance(shown, SourceInput):
+        source = self.GetSource()
+        if source is None:
             raise UnsupportedError(
                 f"a VDI without its volume keeps {what}: generate another from the volume"
             )
-        if not shown.alone:
-            shown = shown.separate()
-            self.driver.set_input(shown)
-        return shown.source
+        return source
 
     def SetSampleDistance(self, distance: float) -> None:
         """Set the length of a step, model units, from which the VDI is regenerated."""
@@ -98,7 +89,7 @@ class VDIMapperMethods:
         self.SetInputData(args[-1])
 
     def SetInputData(self, data: Any) -> None:
-        """Draw a VDI, its canonical image, a series (:attr:`VDIActor.time`) or a set of VDIs."""
+        """Draw a VDI, its canonical image, a series (:attr:`VDIActor.player`) or a set of VDIs."""
         self._set_input(None if data is None else input_of(data))
 
     SetVDI = SetInputData
@@ -137,17 +128,6 @@ class VDIMapperMethods:
         """Return the device as it was set."""
         return self.driver.device
 
-    # In VTK's GPU mapper SetAutoAdjustSampleDistances would draw VTK's own volume into a smaller
-    # framebuffer, so its own switch stays off, and what is called from Python keeps ours.
-
-    def AutoAdjustSampleDistancesOn(self: Any) -> None:
-        """Draw previews."""
-        self.SetAutoAdjustSampleDistances(True)
-
-    def AutoAdjustSampleDistancesOff(self: Any) -> None:
-        """Draw every frame in full."""
-        self.SetAutoAdjustSampleDistances(False)
-
     def ShallowCopy(self: Any, other: Any) -> None:
         """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.
 
@@ -164,7 +144,7 @@ class VDIMapperMethods:
         theirs: Any = other
         shown = other.driver.input
         self.driver.set_input(None if shown is None else shown.shared())
-        self.driver.set(**vars(other.driver.settings))
+        self.driver.settings = other.driver.settings
         cropping = ("Cropping", "CroppingRegionPlanes", "CroppingRegionFlags")
         for name in ("Device", "MaximumImageSampleDistance", *cropping):
             getattr(self, f"Set{name}")(getattr(theirs, f"Get{name}")())

@@ -15,7 +15,7 @@ import numpy as np
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.raycasting.multi_vdi import OwnedImage, PlacedVDI, owned_image
-from pyvista_vdi.vtk_pipeline.drawing.depth import opaque_depth
+from pyvista_vdi.vtk_pipeline.drawing.depth import ends_of_rays, opaque_depth
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
 from pyvista_vdi.vtk_pipeline.drawing.images import Drawn
 from pyvista_vdi.vtk_pipeline.interaction.window import ShownVolume, now
@@ -111,7 +111,7 @@ def _drawn(frames: list[Frame]) -> OwnedImage:
     picture = owned_image(
         [PlacedVDI(f.vdi, f.camera, f.options) for f in seen if f.vdi is not None],
         FrameRequest(
-            first.camera, first.size, opaque_depth=first.depth, device=devices[min(devices)]
+            first.camera, first.size, opaque_depth=ends_of_rays(first), device=devices[min(devices)]
         ),
         margin=_MARGIN,
     )

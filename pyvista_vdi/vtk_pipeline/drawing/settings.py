@@ -2,144 +2,109 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import Field, dataclass, field, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, TypeVar
 
-from pyvista_vdi.model.checks import Number
-from pyvista_vdi.model.options import declared
+from pyvista_vdi.model.checks import Number, as_flag
+from pyvista_vdi.model.options import Option, declared
 from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, DrawingOptions, RenderOptions
 from pyvista_vdi.model.types import Draw, Policy
-from pyvista_vdi.raycasting.picking import checked_opacity
+from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, checked_opacity
 
 _Class = TypeVar("_Class", bound=type)
-
-_DECLARED: Any = declared(RenderOptions, DrawingOptions)
-
-
-def _setting(
-    default: Any, name: str, what: str, more: str, check: Callable[[Any], Any] = bool
-) -> Any:
-    """Return a field: what it is called by VTK, what it is, and what it is checked by."""
-    told = {"name": name, "what": what, "more": more, "check": check}
-    return field(default=default, metadata=told)
 
 
 @dataclass(frozen=True)
 class MapperSettings:
-    """What a user sets of a mapper."""
+    """What a user sets of a mapper: see :data:`SETTINGS`."""
 
-    draw: Draw = _setting(
-        "auto",
-        "Draw",
-        'what is raycast where the volume is at hand: ``"auto"``, ``"vdi"`` or ``"volume"``',
-        'By ``"auto"``, in windows that somebody watches, each frame is drawn by what is expected '
-        "to give the better picture within the frame rate, and at rest by what is there sooner; "
-        "elsewhere by the volume, or by a VDI that nearly the same view has already earned, never "
-        "by time. Volumes that overlap in the picture are drawn by VDIs.",
-        _DECLARED["draw"].check,
-    )
-    regenerate: Policy = _setting(
-        "auto",
-        "Regenerate",
-        'what decides that a view needs a VDI of its own: ``"auto"`` or ``"never"``',
-        'By ``"auto"`` an estimate of the view\'s error does, where somebody watches; by '
-        '``"never"`` only ``actor.regenerate()``.',
-        _DECLARED["regenerate"].check,
-    )
-    regenerate_below: float | None = _setting(
-        None,
-        "RegenerateBelow",
-        "the estimated SSIM below which a VDI does not do for a view",
-        "``None`` is 0.95 where another VDI is made for it, and 0.98 with the detail of the "
-        "picture's pixels where the volume is drawn in its place.",
-        _DECLARED["regenerate_below"].check,
-    )
-    opacity_multiplier: float = _setting(
-        1.0,
-        "OpacityMultiplier",
-        "the factor of the extinction of everything that is drawn",
-        "It acts on the next frame, without another VDI: 2 is twice as dense, 0 transparent.",
-        _DECLARED["opacity_multiplier"].check,
-    )
-    transmittance_cutoff: float = _setting(
-        TRANSMITTANCE_CUTOFF,
-        "TransmittanceCutoff",
-        "the light below which rays end, 0 to below 1",
-        "No channel loses more than that. VTK's own volume mappers stop at about 1/255. VDIs that "
-        "overlap are merged to the default.",
-        _DECLARED["transmittance_cutoff"].check,
-    )
-    image_distance: float = _setting(
-        1.0,
-        "ImageSampleDistance",
-        "for how many pixels along each edge a ray is cast, 1 to 100",
-        "The picture is interpolated linearly, as by VTK's mappers.",
-        Number("a number from 1 to 100", 1, 100, name="the image sample distance"),
-    )
-    picking_opacity: float = _setting(
-        0.05,
-        "PickingOpacity",
-        "the opacity that a ray must reach in the VDI to pick it, 0 to below 1",
-        "It is that from the ray's beginning on.",
-        checked_opacity,
-    )
-    adjust: bool = _setting(
-        True,
-        "AutoAdjustSampleDistances",
-        "whether previews of fewer pixels are drawn while the view moves",
-        "That is where the window's desired update rate is at least 1 per second. Frames at rest, "
-        "screenshots, exports and off-screen windows are always full.",
-    )
-    adjust_multi_samples: bool = _setting(
-        True,
-        "AutoAdjustMultiSamples",
-        "whether previews go without multisampling where that makes them late",
-        "All VDIs in a window must allow it; ``GetMultiSamples()`` stays as it was set.",
-    )
-    target: float | None = _setting(
-        None,
-        "TargetFrameRate",
-        "the frames per second that previews keep",
-        "``None`` means the window's desired update rate, 0 that every frame is full. Several VDIs "
-        "in a window keep the highest of their targets.",
-        _DECLARED["target_fps"].check,
-    )
-    off_screen: bool = _setting(
-        False,
-        "InteractiveOffScreen",
-        "whether off-screen windows are treated as if somebody watched them",
-        "",
-    )
+    draw: Draw = "auto"
+    regenerate: Policy = "auto"
+    regenerate_below: float | None = None
+    opacity_multiplier: float = 1.0
+    transmittance_cutoff: float = TRANSMITTANCE_CUTOFF
+    target_fps: float | None = None  # the window's desired update rate
+    adjust_multi_samples: bool = True
+    image_distance: float = 1.0
+    picking_opacity: float = DEFAULT_OPACITY
+    adjust: bool = True
+    off_screen: bool = False
 
     @property
     def previews(self) -> bool:
         """Whether a frame of a motion may have fewer rays."""
-        return self.adjust and self.target != 0
+        return self.adjust and self.target_fps != 0
+
+
+_DECLARED = declared(RenderOptions, DrawingOptions)
+
+#: The settings, by VTK's names.
+SETTINGS: Mapping[str, Option] = {
+    "Draw": _DECLARED["draw"],
+    "Regenerate": _DECLARED["regenerate"],
+    "RegenerateBelow": _DECLARED["regenerate_below"],
+    "OpacityMultiplier": _DECLARED["opacity_multiplier"],
+    "TransmittanceCutoff": _DECLARED["transmittance_cutoff"],
+    "TargetFrameRate": _DECLARED["target_fps"],
+    "AutoAdjustMultiSamples": Option(
+        "adjust_multi_samples",
+        True,
+        "whether previews go without multisampling where that makes them late",
+        "All VDIs in a window must allow it; ``GetMultiSamples()`` stays as it was set.",
+        check=partial(as_flag, name="AutoAdjustMultiSamples"),
+    ),
+    "ImageSampleDistance": Option(
+        "image_distance",
+        1.0,
+        "for how many pixels along each edge a ray is cast, 1 to 100",
+        "The picture is interpolated linearly, as by VTK's mappers.",
+        check=Number("a number from 1 to 100", 1, 100, name="the image sample distance"),
+    ),
+    "PickingOpacity": Option(
+        "picking_opacity",
+        DEFAULT_OPACITY,
+        "opacity that a ray must reach in the VDI, from its beginning on, to pick it",
+        check=checked_opacity,
+    ),
+    "AutoAdjustSampleDistances": Option(
+        "adjust",
+        True,
+        "whether previews of fewer pixels are drawn while the view moves",
+        "That is where the window's desired update rate is at least 1 per second. Frames at rest, "
+        "screenshots, exports and off-screen windows are always full.",
+        check=partial(as_flag, name="AutoAdjustSampleDistances"),
+    ),
+    "InteractiveOffScreen": Option(
+        "off_screen",
+        False,
+        "whether off-screen windows are treated as if somebody watched them",
+        check=partial(as_flag, name="InteractiveOffScreen"),
+    ),
+}
 
 
 def with_settings(cls: _Class) -> _Class:
     """Add to a class of mappers VTK's Set and Get of each setting."""
-    for each in fields(MapperSettings):
-        for verb, method in zip(("Set", "Get"), _pair(each), strict=True):
-            method.__name__ = f"{verb}{each.metadata['name']}"
+    for name, told in SETTINGS.items():
+        for verb, method in zip(("Set", "Get"), _pair(told), strict=True):
+            method.__name__ = f"{verb}{name}"
             method.__qualname__ = f"{cls.__name__}.{method.__name__}"
             setattr(cls, method.__name__, method)
     return cls
 
 
-def _pair(of: Field[Any]) -> tuple[Callable[..., None], Callable[..., Any]]:
-    told = of.metadata
-
+def _pair(told: Option) -> tuple[Callable[..., None], Callable[..., Any]]:
     def setter(self: Any, value: Any) -> None:
-        # PyVista's constructor sets some before there is a driver
-        if self._driver is not None and self._driver.set(**{of.name: told["check"](value)}):
+        value, driver = told.check(value) if told.check else value, self.driver
+        if driver is not None and getattr(driver.settings, told.name) != value:
+            driver.settings = replace(driver.settings, **{told.name: value})
             self.Modified()
 
     def getter(self: Any) -> Any:
-        return getattr(self.driver.settings, of.name)
+        return getattr(self.driver.settings, told.name)
 
-    what, more = told["what"], told["more"]
-    setter.__doc__ = f"Set {what}; {of.default!r} by default.\n\n{more}".rstrip()
-    getter.__doc__ = f"Return {what}."
+    setter.__doc__ = f"Set {told.what}.\n\n{told.more}".rstrip()
+    getter.__doc__ = f"Return {told.what}."
     return setter, getter

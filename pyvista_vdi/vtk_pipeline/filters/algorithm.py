@@ -5,9 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from numpy.typing import ArrayLike
+
 from pyvista_vdi.errors import Cancelled, InvalidVDIError, VDIError
+from pyvista_vdi.model.camera import check_window_size
+from pyvista_vdi.model.types import CameraLike
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.filters.properties import check_property, color_function
+from pyvista_vdi.vtk_pipeline.filters.view import camera_of
 
 _PIPELINE = vtk.vtkStreamingDemandDrivenPipeline
 TIME_STEPS = _PIPELINE.TIME_STEPS()
@@ -34,15 +39,8 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
         self._python_waits = False
         self._before: Any = None
 
-    def SetInputDataObject(self, *args: Any) -> None:
-        """Set the input (optionally after a port number, 0)."""
-        vtk.require_this_build(type(args[-1]))
-        super().SetInputDataObject(*args)
-        self._before = None
-
     def SetInputConnection(self, *args: Any) -> None:
         """Set what makes the input, a port of another algorithm (optionally after a number)."""
-        vtk.require_this_build(type(args[-1]))
         super().SetInputConnection(*args)
         # Of an algorithm in Python VTK holds no more than what is written in C++
         self._before = None if args[-1] is None else args[-1].GetProducer()
@@ -71,16 +69,6 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
                 f"{type(self).__name__} has no input (SetInputDataObject, SetInputConnection), or "
                 "what is before it failed: then VTK's output window says why"
             )
-
-    def UpdateTimeStep(self, time: float, *args: Any) -> None:
-        """Bring the output up to date as of a time, and raise what went wrong.
-
-        The time stays asked for until another one is. Pieces and ghosts, which VTK's method takes
-        as well, make no difference: images come whole.
-        """
-        self.UpdateInformation()
-        self.GetOutputInformation(0).Set(UPDATE_TIME_STEP, float(time))
-        self.Update()
 
     def RequestUpdateExtent(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Ask for the whole input, whatever part of the output is wanted."""
@@ -138,6 +126,11 @@ def named_pair(name: str, what: str, *methods: Callable[..., Any]) -> Any:
     return methods
 
 
+def checked_size(*size: Any) -> tuple[int, int] | None:
+    """Return a window's size, given as two numbers or as a pair; ``None`` as it is."""
+    return None if size == (None,) else check_window_size(size[0] if len(size) == 1 else size)
+
+
 class HeldByVTK:
     """A VTK object that an attribute keeps alive in C++ alone: what the user hands to an algorithm.
 
@@ -155,11 +148,34 @@ class HeldByVTK:
         return self._holder.GetItemAsObject(0)
 
 
-class Classifying(Algorithm):
-    """An algorithm that is out of date when its volume property is changed."""
+class SceneAlgorithm(Algorithm):
+    """An algorithm with a view, a device and a volume property, whose changes it follows."""
+
+    SetDevice, GetDevice = accessors("device", "the OpenCL device; ``None`` is the default one")
+    _, GetCamera = accessors("camera", "the view, as it was set; ``None`` where none was")
 
     _property: HeldByVTK | None = None
     _observed: tuple[tuple[HeldByVTK, int], ...] = ()
+
+    def SetCamera(
+        self, camera: CameraLike | None, model_transform: ArrayLike | None = None
+    ) -> None:
+        """Set the view: a copy is kept.
+
+        Parameters
+        ----------
+        camera : vtkCamera or pyvista.Camera or Camera or None
+            ``None``, the default, is the view of a mapper's first frame for a ``VDISource``, and
+            the generating view for ``VDIToImage``.
+        model_transform : array_like, shape (4, 4), optional
+            Where the volume stands in that view's world: the actor's matrix.
+
+        Raises
+        ------
+        InvalidCameraError, UnsupportedError
+            If it is no camera, or has what the optical model has no place for.
+        """
+        self._change("camera", None if camera is None else camera_of(camera, model_transform))
 
     def SetVolumeProperty(self, prop: Any) -> None:
         """Set the volume property; later changes to it make the output out of date.
@@ -192,7 +208,7 @@ class Classifying(Algorithm):
         if prop.HasGradientOpacity():
             there.append(prop.GetStoredGradientOpacity())
 
-        def changed(algorithm: Classifying) -> None:
+        def changed(algorithm: SceneAlgorithm) -> None:
             algorithm._observe_property()  # its functions may be others now
             algorithm.Modified()
 

@@ -47,7 +47,6 @@ def require_image(data: Any) -> vtk.vtkImageData:
     """Return ``data`` if it is a uniform grid, and say how to make one of anything else."""
     if isinstance(data, vtk.vtkImageData):
         return data
-    vtk.require_this_build(type(data))
     if not hasattr(data, "GetClassName"):
         raise InvalidVolumeTypeError(
             f"expected a vtkImageData or pyvista.ImageData; got {type(data).__name__}"
@@ -225,7 +224,7 @@ def vdi_to_image(vdi: VDI | DeferredVDI) -> vtk.vtkImageData:
         bit.
     """
     lists: VDI = vdi.with_precision("exact").lists
-    kept = {} if lists.kept is None else {"deferred": lists.kept}
+    kept = {"deferred": vdi.about} if isinstance(vdi, DeferredVDI) else {}
     width, height = lists.window_size
     image = vtk.vtkImageData()
     image.SetDimensions(width, height, 1)
@@ -282,7 +281,6 @@ def vdi_from_image(image: Any) -> VDI | DeferredVDI:
     InvalidVDIError
         If the image is not such a form, of a newer version, or its arrays break a rule.
     """
-    vtk.require_this_build(type(image))
     if not is_vdi_image(image):
         kind = type(image).__name__
         raise InvalidVDIError(

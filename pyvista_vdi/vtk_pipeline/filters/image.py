@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io import to_bytes
@@ -19,15 +19,14 @@ from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     WHOLE_EXTENT,
-    Classifying,
+    SceneAlgorithm,
     accessors,
     announce,
     ask_for_all,
+    checked_size,
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, to_vtk, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
-from pyvista_vdi.vtk_pipeline.filters.source import checked_size
-from pyvista_vdi.vtk_pipeline.filters.view import camera_of
 from pyvista_vdi.vtk_pipeline.vtk import VTK_UNSIGNED_CHAR, vtkImageData
 
 #: Point scalars of the picture: straight RGBA, uint8.
@@ -40,7 +39,7 @@ PREMULTIPLIED = "premultiplied"
 _DEGREES = Number("finite degrees", -math.inf, open_ended=True, name="the angle of a view")
 
 
-class VDIToImage(Classifying):
+class VDIToImage(SceneAlgorithm):
     """Raycast the VDI at its input, and put out the picture.
 
     In goes a VDI in its canonical VTK form (see
@@ -67,13 +66,11 @@ class VDIToImage(Classifying):
     SetElevation, GetElevation = accessors(
         "elevation", "by how much the view is lifted after turning it, degrees", 0.0, _DEGREES
     )
-    SetDevice, GetDevice = accessors("device", "the OpenCL device; ``None`` is the default one")
     SetWindowSize, GetWindowSize = accessors(
         "window_size",
         "the picture's width and height in pixels; ``None`` is :attr:`VDI.picture_size`",
         check=checked_size,
     )
-    _, GetCamera = accessors("camera", "the view before it is turned; ``None``: the generating one")
 
     def __init__(self) -> None:
         super().__init__(
@@ -81,25 +78,6 @@ class VDIToImage(Classifying):
         )
         self._vdi: VDI | DeferredVDI | None = None
         self._vdi_of: tuple[str, int] | None = None
-        self._look: VDI | None = None
-        self._look_of: Any = None
-
-    def SetCamera(self, camera: Any, model_transform: ArrayLike | None = None) -> None:
-        """Set the new view V_N.
-
-        Parameters
-        ----------
-        camera : vtkCamera or pyvista.Camera or Camera or None
-            A copy is kept. ``None``, the default, means the generating view.
-        model_transform : array_like, shape (4, 4), optional
-            Where the VDI's model frame is in that view's world.
-
-        Raises
-        ------
-        InvalidCameraError, UnsupportedError
-            If it is no camera, or has what the optical model has no place for.
-        """
-        self._change("camera", None if camera is None else camera_of(camera, model_transform))
 
     def GetImage(self) -> vtkImageData:
         """Return the picture, brought up to date.
@@ -147,11 +125,7 @@ class VDIToImage(Classifying):
                 "the VDI keeps values, and VDIToImage has no volume property that classifies them: "
                 "call SetVolumeProperty"
             )
-        key = (self._vdi_of, prop.GetAddressAsString(""), prop.GetMTime())
-        if self._look is None or key != self._look_of:
-            table = transfer_function_from_property(prop)
-            self._look, self._look_of = classify_on_device(vdi, table, self.GetDevice()), key
-        return self._look
+        return classify_on_device(vdi, transfer_function_from_property(prop), self.GetDevice())
 
     def _read(self, image: vtkImageData) -> VDI | DeferredVDI:
         """Return the VDI; the same object as long as it is the same (it is on the device)."""

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVDIError
-from pyvista_vdi.generation.deferred import warn_of_range
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
@@ -25,7 +24,7 @@ from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_imag
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import View, camera_of
-from pyvista_vdi.vtk_pipeline.vtk import require_this_build, vtkImageData
+from pyvista_vdi.vtk_pipeline.vtk import vtkImageData
 
 #: What two equal sizes of pixels differ by at most.
 ROUNDING = 1e-6
@@ -48,8 +47,8 @@ class Input:
     remedy = "without its volume it cannot be made anew"
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
     period: int | None = None
-    #: Whether something goes on that the event loop has to look at.
-    busy = False
+    #: Whether one step of a series is shown after the other: the event loop has to look at that.
+    playing = False
 
     def __init__(self, vdi: VDI | None = None, port: Any = None) -> None:
         self._vdi = vdi
@@ -142,13 +141,9 @@ class SourceInput(Input):
         self._camera: Camera | None = None  # what frames gave, which nobody has set
         self._size: tuple[int, int] | None = None
 
-    def separate(self) -> SourceInput:
+    def shared(self) -> SourceInput:
         """Return an input from a source of its own, with the same settings and VDI."""
-        return self.shared(self.source.Copy())
-
-    def shared(self, source: VDISource | None = None) -> SourceInput:
-        """Return an input from the same source, or from another one that is alike."""
-        other = SourceInput(source or self.source)
+        other = SourceInput(self.source.Copy())
         other._camera, other._size, other.of_scene = self._camera, self._size, self.of_scene
         return other
 
@@ -168,8 +163,8 @@ class SourceInput(Input):
         return len(self.source.inputs) == 1
 
     def vdi(self) -> VDI | None:
-        """Return the VDI, brought up to date."""
-        return as_vdi(self.source.GetVDI())
+        """Return the VDI of the data at the source's input, brought up to date."""
+        return self.source.UpdateFromInput()
 
     def last(self) -> VDI | None:
         """Return the VDI made last."""
@@ -182,15 +177,21 @@ class SourceInput(Input):
         return self.source.GetInputConnection(0, 0) if connected else None
 
     def bounds(self) -> tuple[float, ...] | None:
-        """Return the bounds of the volume, brought up to date; ``None`` where there is none."""
-        return bounds_before(self.source)
+        """Return the bounds of the volume, brought up to date; ``None`` where there is none.
+
+        VTK's mappers do so, too, because many filters announce other bounds than they give.
+        """
+        data: Any = None if self.port is None else self.source.UpdateInput()
+        known = isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0
+        return tuple(data.GetBounds()) if known else None
 
     def stamp(self) -> Any:
-        """Return the newest time stamp of all that it depends on."""
+        """Return the time stamps of all that it depends on, and a shaded volume's lights."""
         source, prop = self.source, self.source.GetVolumeProperty()
         data = None if self.port is None else source.UpdateInput()
-        there = (source, data, prop)
-        return max(thing.GetMTime() for thing in there if thing is not None)
+        stamps = [thing and thing.GetMTime() for thing in (source, data, prop)]
+        lights = source.GetLights() if prop is not None and prop.GetShade() else None
+        return *stamps, lights, source.placed if lights and lights.of_scene else None
 
     def note_scene(self, renderers: Sequence[Any], model_transform: NDArray[np.float64]) -> None:
         """Note a renderer that shows it, for its lights, unless none does, and where it stands."""
@@ -199,8 +200,7 @@ class SourceInput(Input):
         if self.of_scene and not known and (self.alone or lit_by is None):
             source.lit_by.Set(renderers[0] if renderers else None)
         if self.alone:
-            source.SetPlace(model_transform)
-        source.CheckLights()
+            source.placed = tuple(map(tuple, model_transform.tolist()))
 
     def keep_lights(self, closed: Sequence[Any]) -> None:
         """Keep the lights of the renderer that lights it, if that is one of those that close."""
@@ -258,19 +258,17 @@ class SourceInput(Input):
             source.TakeVDI(source.MakeVDI(wanted), wanted, view=False)
         return source.GetCurrentVDI()  # type: ignore[return-value]
 
-    def exact_request(
-        self, view: View, tile: tuple[Camera, tuple[int, int]] | None = None
-    ) -> Request:
-        """Return what a VDI of exactly a view's picture is made of, or of a tile of it.
+    def exact_request(self, view: View) -> Request:
+        """Return what a VDI of exactly a view's picture is made of.
 
         What covers all of a volume that is near would have larger lists than that has pixels.
         """
         wanted = self.source.MakeRequest(view)
-        camera, size = tile or (view.camera, view.size)
+        camera, size = view.camera, view.size
         generating, lists = wanted.generating
         extents = zip(generating.half_extent(lists), camera.half_extent(size), strict=True)
         pixels = math.prod(size) * math.prod(high / low for high, low in extents)
-        if tile is not None or pixels > math.prod(lists) * (1 + ROUNDING):
+        if pixels > math.prod(lists) * (1 + ROUNDING):
             wanted = replace(wanted, generating=(camera, size))
         return wanted
 
@@ -308,36 +306,39 @@ class SourceInput(Input):
 class DeferredInput(Input):
     """Values that a volume property classifies, anew when it has changed; no volume is needed.
 
-    Those of a source are made once, of the first view that there is; then the volume is let go of.
+    Values that are not made yet are what ``values`` returns for the first view that there is, or
+    that of the ``camera``; their ``bounds`` are known before.
     """
 
-    def __init__(self, values: DeferredVDI | VDISource, prop: Any) -> None:
+    def __init__(
+        self,
+        values: DeferredVDI | Callable[[View], DeferredVDI],
+        prop: Any,
+        bounds: tuple[float, ...] | None = None,
+        camera: Camera | None = None,
+    ) -> None:
         super().__init__()
-        self._values, self.prop = values, prop
+        self.prop, self._values, self._bounds, self._camera = prop, values, bounds, camera
+        self._view: View | None = None
         self._made_at: Any = None
         self._look: TransferFunction | None = None  # of the VDI that was made last
 
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
         """The values, made now if they are not yet; ``None`` without a view to make them of."""
-        source: Any = self._values
-        if isinstance(source, VDISource):
-            if source.GetWindowSize() is None:
+        if not isinstance(self._values, DeferredVDI):
+            if self._view is None:
                 return None
-            made: Any = source.GetVDI()
-            warn_of_range(made, source.GetVolume())
-            self._values = made
-        return self._values  # type: ignore[return-value]
+            self._values = self._values(self._view)
+        return self._values
 
     def set_view_if_missing(
         self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
     ) -> None:
         """Take the view of a frame, or a camera that was given, as that of the values."""
-        source = self._values
-        if isinstance(source, VDISource) and source.GetWindowSize() is None:
-            given = source.GetCamera() or camera_of(camera, model_transform)
-            source.SetCamera(given.replace(model_transform=model_transform))
-            source.SetWindowSize(size)
+        if self._view is None:
+            given = self._camera or camera_of(camera, model_transform)
+            self._view = View(given.replace(model_transform=model_transform), size)
 
     def on_devices(self) -> list[Any]:
         """Return the VDI and its values."""
@@ -345,11 +346,8 @@ class DeferredInput(Input):
 
     def vdi(self) -> VDI | None:
         """Return the VDI that the property makes of the values now; ``None`` without a view."""
-        values = self.deferred
-        if values is None:
-            return None
-        stamp = self.stamp()
-        if self._vdi is None or self._made_at != stamp:
+        values, stamp = self.deferred, self.stamp()
+        if values is not None and (self._vdi is None or self._made_at != stamp):
             look = transfer_function_from_property(self.prop)
             if self._vdi is None or self._look != look:  # the time stamp alone says little
                 self._vdi, self._look = classify_on_device(values, look), look
@@ -358,27 +356,17 @@ class DeferredInput(Input):
 
     def classified_by(self, prop: Any) -> Input:
         """Return one of the same values: whoever shares this one keeps the property."""
-        return DeferredInput(self._values, prop)
+        other = DeferredInput(self._values, prop, self._bounds, self._camera)
+        other._view = self._view
+        return other
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds in the model frame."""
-        values = self._values
-        return bounds_before(values) if isinstance(values, VDISource) else values.bounds
+        return self._values.bounds if isinstance(self._values, DeferredVDI) else self._bounds
 
     def stamp(self) -> Any:
         """Return the time stamp of the property and its functions."""
         return self.prop.GetMTime()
-
-
-def bounds_before(source: VDISource) -> tuple[float, ...] | None:
-    """Return the bounds of a source's volume, model frame; ``None`` where there is no volume.
-
-    Its input is brought up to date, as by VTK's mappers, because many filters announce other
-    bounds than they give; no VDI is made.
-    """
-    data: Any = source.UpdateInput() if source.GetNumberOfInputConnections(0) > 0 else None
-    known = isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0
-    return tuple(data.GetBounds()) if known else None
 
 
 def input_of(data: Any) -> Input:
@@ -395,7 +383,6 @@ def input_of(data: Any) -> Input:
     show = registry.shown(data)
     if show is not None:
         return show(data)  # type: ignore[no-any-return]
-    require_this_build(type(data))
     raise InvalidVDIError(
         f"a VDIMapper draws a VDI, its canonical image, a series, a set or a VDISource's output; "
         f"got {type(data).__name__}: put a VDISource between a volume and the mapper"
@@ -404,7 +391,6 @@ def input_of(data: Any) -> Input:
 
 def input_of_port(port: Any) -> Input:
     """Return what to draw for an output port."""
-    require_this_build(type(port))
     producer = port.GetProducer()
     if isinstance(producer, VDISource):
         return SourceInput(producer)

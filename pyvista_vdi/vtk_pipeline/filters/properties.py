@@ -103,7 +103,6 @@ def transfer_function_from_property(
 
 def check_property(prop: Any, *, rgba: bool = False) -> None:
     """Refuse what no table can have; functions may be filled with points later."""
-    vtk.require_this_build(type(prop))
     if not isinstance(prop, vtk.vtkVolumeProperty):
         raise InvalidArgumentError(
             f"volume_property must be a vtkVolumeProperty; got {type(prop).__name__}"

@@ -8,37 +8,36 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pyvista_vdi.errors import (
+    Cancelled,
     InvalidArgumentError,
     InvalidVolumeError,
-    UnsupportedError,
     warn_external,
 )
-from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_range, one_of
-from pyvista_vdi.model.coverage import bounds_corners, covering_view
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import (
-    Deferral,
     GenerationOptions,
     GenerationRequest,
     QualityTarget,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.types import CameraLike, LightsLike
+from pyvista_vdi.model.types import LightsLike
 from pyvista_vdi.model.vdi import VDI, screen_metadata
+from pyvista_vdi.model.view import bounds_corners, covering_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.targets import generate_to_target, warn_missed
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     UPDATE_TIME_STEP,
-    Classifying,
+    SceneAlgorithm,
     accessors,
     announce,
     ask_for_all,
+    checked_size,
+    named_pair,
     wanted_time,
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import (
@@ -47,19 +46,9 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     vdi_to_image,
     volume_from_vtk,
 )
-from pyvista_vdi.vtk_pipeline.filters.option_methods import OptionMethods
-from pyvista_vdi.vtk_pipeline.filters.properties import (
-    INTERPOLATION,
-    check_property,
-    transfer_function_from_property,
-)
-from pyvista_vdi.vtk_pipeline.filters.view import View, camera_of
-from pyvista_vdi.vtk_pipeline.vtk import (
-    require_this_build,
-    vtkDataObject,
-    vtkImageData,
-    vtkWeakReference,
-)
+from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
+from pyvista_vdi.vtk_pipeline.filters.view import View
+from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData, vtkWeakReference
 
 
 @dataclass(frozen=True)
@@ -71,11 +60,11 @@ class Request:
     screen: View
     generating: tuple[Camera, tuple[int, int]]  # V_O and its window, after coverage
     options: GenerationOptions
-    deferral: Deferral
     target: QualityTarget | None
     device: Any
     metadata: dict[str, Any]  # what is added to the VDI's
     content: Any = field(repr=False)  # equal where what is generated from is, the view apart
+    covered: bool = True  # as far as coverage asks
 
     @property
     def key(self) -> Any:
@@ -98,20 +87,7 @@ class Request:
         )
 
 
-def checked_size(*size: Any) -> tuple[int, int] | None:
-    """Return a window's size, given as two numbers or as a pair; ``None`` as it is."""
-    return None if size == (None,) else check_window_size(size[0] if len(size) == 1 else size)
-
-
-def checked_deferral(*given: Any, **named: Any) -> Deferral:
-    """Return when scalars are classified; a pair in it tells whether another is the same."""
-    found = Deferral(*given, **named)
-    if found.value_range is None:
-        return found
-    return replace(found, value_range=as_range(found.value_range))
-
-
-class VDISource(OptionMethods, Classifying):
+class VDISource(SceneAlgorithm):
     """Generate a VDI from the volume at its input.
 
     One ``vtkImageData`` in; out comes the VDI in its canonical VTK form (see
@@ -161,15 +137,6 @@ class VDISource(OptionMethods, Classifying):
         "have their defaults, as ``Tolerance`` has to; ``GetVDI().metadata['dial']`` says what",
         check=lambda *given, **named: QualityTarget(*given, **named) or None,
     )
-    SetDeferral, GetDeferral = accessors(
-        "deferral",
-        "when scalars are classified, by the arguments of ``Deferral``; without any, as the VDI is "
-        "made. ``'deferred'`` makes a ``DeferredVDI``: of the volume property, which may be left "
-        "out, only the interpolation counts then",
-        Deferral(),
-        checked_deferral,
-    )
-    SetDevice, GetDevice = accessors("device", "the OpenCL device; ``None`` is the default one")
     SetMetadata, GetMetadata = accessors(
         "metadata", "entries to add to the VDI's metadata", {}, dict
     )
@@ -186,10 +153,9 @@ class VDISource(OptionMethods, Classifying):
             nOutputPorts=1,
             outputType="vtkImageData",
         )
-        self._camera: Camera | None = None
-        self._lights = Lights()  # of the renderer, as they were read last
         self.lit_by = vtkWeakReference()  # the renderer whose lights are looked at
-        self._placed: Any = None  # rows of the actor's matrix
+        #: Rows of the matrix of the actor that shows it: lights of the scene shine on it there.
+        self.placed: Any = None
         self._volume: Volume | None = None
         self._volume_key: Any = None
         self._table: TransferFunction | None = None
@@ -212,33 +178,6 @@ class VDISource(OptionMethods, Classifying):
     _, GetScalars = accessors("scalars", "the array's name, or ``None`` for the active scalars")
     _, GetPreference = accessors("preference", "whether points or cells come first", "point")
 
-    def SetCamera(
-        self, camera: CameraLike | None, model_transform: ArrayLike | None = None
-    ) -> None:
-        """Set the generating view V_O.
-
-        Parameters
-        ----------
-        camera : vtkCamera or pyvista.Camera or Camera or None
-            A copy counts. ``None`` waits for the first frame of a mapper.
-        model_transform : array_like, shape (4, 4), optional
-            Where the volume stands in that view's world: the actor's matrix.
-
-        Raises
-        ------
-        InvalidCameraError, UnsupportedError
-            If it is no camera, or has what the optical model has no place for.
-        """
-        require_this_build(type(camera))
-        view = None if camera is None else camera_of(camera, model_transform)
-        if view != self._camera:
-            self._camera = view
-            self.Modified()
-
-    def GetCamera(self) -> Camera | None:
-        """Return the generating view on the screen, before coverage widens it."""
-        return self._camera
-
     def SetLights(self, lights: LightsLike | None) -> None:
         """Set what a shaded volume is lit by.
 
@@ -250,62 +189,19 @@ class VDISource(OptionMethods, Classifying):
             camera do not. What is given as a list is copied now.
         """
         renderer = lights if hasattr(lights, "GetTwoSidedLighting") else None
-        require_this_build(type(renderer))
         self.lit_by.Set(renderer)
-        self._take_lights(Lights.from_any(lights))
+        self._change("lights", Lights.from_any(lights), Lights())
 
     def GetLights(self) -> Lights:
         """Return what a shaded volume is lit by; of a renderer, as its lights are now."""
-        renderer = self.lit_by.Get()
-        if renderer is not None:
-            self._take_lights(Lights.from_any(renderer))
-        return self._lights
-
-    def CheckLights(self) -> None:
-        """Be out of date if a shaded volume's renderer has other lights by now."""
-        if self._is_shaded():
-            self.GetLights()
-
-    def _take_lights(self, lights: Lights) -> None:
-        if lights != self._lights:
-            self._lights = lights
-            if self._is_shaded():
-                self.Modified()
-
-    def SetPlace(self, model_transform: ArrayLike) -> None:
-        """Note the matrix, (4, 4), of the actor that the volume is shown by.
-
-        Where lights of the scene shine on a shaded volume, another place makes another VDI, which
-        is lit there.
-        """
-        placed = tuple(map(tuple, np.asarray(model_transform).tolist()))
-        if placed != self._placed:
-            self._placed = placed
-            if self._is_shaded() and self._lights.of_scene:
-                self.Modified()
-
-    def _is_shaded(self) -> bool:
-        prop = self.GetVolumeProperty()
-        return prop is not None and bool(prop.GetShade())
+        if self.lit_by.Get() is not None:
+            self._set["lights"] = Lights.from_any(self.lit_by.Get())
+        return self._set.get("lights", Lights())
 
     # What is made
 
-    def Update(self, *args: Any) -> None:
-        """Bring the output up to date, and raise what went wrong."""
-        self.CheckLights()
-        connected = self.GetNumberOfInputConnections(0) > 0
-        data = self.GetInputDataObject(0, 0) if connected else None
-        # Somebody may have brought the input to another time, and this asks for none: VTK's filters
-        # look at the data of their input only when they have reason to execute
-        known = isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0
-        if known and self._request and wanted_time(self.GetOutputInformation(0)) is None:
-            before = self._request.volume
-            if self._read(data) is not before:
-                self.Modified()
-        super().Update(*args)
-
     def GetVDI(self) -> VDI:
-        """Return the VDI, brought up to date; a ``DeferredVDI`` if :meth:`SetDeferral` says so.
+        """Return the VDI, brought up to date.
 
         Raises
         ------
@@ -315,8 +211,8 @@ class VDISource(OptionMethods, Classifying):
             What generating raises.
         """
         self.Update()
-        assert self._vdi is not None
-        return self._vdi
+        # VTK looks at the input's data, and nobody at lights, only where there is reason to execute
+        return self._made(self._make_request(self.UpdateInput()))
 
     def GetCurrentVDI(self) -> VDI | None:
         """Return the VDI made last, whether up to date or not."""
@@ -332,12 +228,7 @@ class VDISource(OptionMethods, Classifying):
         This brings the pipeline before the source up to date, and generates nothing; it raises what
         :meth:`GetVDI` would raise before it generates.
         """
-        if self.GetDeferral().deferred:
-            raise UnsupportedError(
-                "this VDISource keeps values, and a mapper draws colours: give add_vdi or "
-                "VDIToImage what it makes, or VDIMapper GetVDI().classified(cmap=..., opacity=...)"
-            )
-        return self._make_request(self.UpdateInput(), view, warn=False)
+        return self._make_request(self.UpdateInput(), view)
 
     def TakeVDI(self, vdi: VDI, request: Request, *, view: bool = True) -> None:
         """Take a VDI that was made of a request elsewhere, as if it had been made here.
@@ -345,19 +236,25 @@ class VDISource(OptionMethods, Classifying):
         ``view``: its view becomes that of the VDIs to come.
         """
         if view:
-            self._set["window_size"], self._camera = request.screen.size, request.screen.camera
+            self._set |= {"window_size": request.screen.size, "camera": request.screen.camera}
         self._vdi, self._request = vdi, request
         self.Modified()  # the output is another
 
     def MakeVDI(self, request: Request) -> VDI:
         """Return the VDI of a request, made now; what the source has made stays."""
         self.SetAbortExecute(0)  # of this VDI nobody has said it yet
+        if not request.covered:
+            warn_external(
+                "coverage='bounds' needs the eye outside the volume, with all of it in front: the "
+                "VDI covers the current view only (coverage='view'); move the camera back and "
+                "regenerate for the whole volume"
+            )
         asked = request.generation.replace(progress=self._advance)
-        if request.deferral.deferred:
-            return generate_deferred(asked, request.deferral)  # type: ignore[return-value]
         if request.target is None:
             return generate_vdi(asked)
-        return generate_to_target(asked, request.target)
+        vdi = generate_to_target(asked, request.target)
+        warn_missed(vdi)
+        return vdi
 
     def GetVolume(self) -> Volume:
         """Return the volume at the input, read again only if it has changed; raises if none is."""
@@ -372,9 +269,9 @@ class VDISource(OptionMethods, Classifying):
         other.SetInputConnection(self.GetInputConnection(0, 0))
         other.SetVolumeProperty(self.GetVolumeProperty())
         other.lit_by.Set(self.lit_by.Get())
-        for name in ("camera", "lights", "placed", "volume", "volume_key", "vdi", "request"):
-            setattr(other, f"_{name}", getattr(self, f"_{name}"))
-        other._set = dict(self._set)
+        other._set, other.placed = dict(self._set), self.placed
+        other._volume, other._volume_key = self._volume, self._volume_key
+        other._vdi, other._request = self._vdi, self._request
         return other
 
     def UpdateInput(self) -> Any:
@@ -393,6 +290,14 @@ class VDISource(OptionMethods, Classifying):
         self.GetInputAlgorithm(0, 0).Update()
         return self.GetInputDataObject(0, 0)
 
+    def UpdateFromInput(self) -> VDI:
+        """Return the VDI of the data that are at the input by now.
+
+        They are those of before where an algorithm further up has failed, which :meth:`GetVDI`
+        raises.
+        """
+        return self._made(self.MakeRequest())
+
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the output's extent: one point per list, as far as it is known before."""
         self.picture_size = self.GetWindowSize() or (1, 1)
@@ -401,65 +306,56 @@ class VDISource(OptionMethods, Classifying):
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
-        request = self._make_request(vtkDataObject.GetData(inputs[0], 0), None, warn=True)
-        if self._vdi is None or self._request is None or request.key != self._request.key:
-            self._vdi = self.MakeVDI(request)
-            self._request = request
-            if request.target is not None:
-                warn_missed(self._vdi)
-        vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(self._vdi))
+        vdi = self._made(self._make_request(vtkDataObject.GetData(inputs[0], 0)))
+        vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(vdi))
         # Coverage and a dial have chosen it only now
-        announce(outputs, self._vdi.window_size)
+        announce(outputs, vdi.window_size)
         ask_for_all([outputs])
 
-    def _make_request(self, image: Any, view: View | None, *, warn: bool) -> Request:
-        prop, deferral, target = self.GetVolumeProperty(), self.GetDeferral(), self.GetDial()
-        camera = self._camera if view is None else view.camera
+    def _made(self, request: Request) -> VDI:
+        """Return a request's VDI, made now unless it is the one that was made last."""
+        if self._vdi is None or self._request is None or request.key != self._request.key:
+            self._vdi, self._request = self.MakeVDI(request), request
+        return self._vdi
+
+    def _make_request(self, image: Any, view: View | None = None) -> Request:
+        prop, target = self.GetVolumeProperty(), self.GetDial()
+        camera = self.GetCamera() if view is None else view.camera
         window_size = self.GetWindowSize() if view is None else view.size
         needed = {
             "camera (SetCamera)": camera,
             "window size (SetWindowSize)": window_size,
-            "volume property (SetVolumeProperty)": prop or deferral.deferred or None,
+            "volume property (SetVolumeProperty)": prop,
         }
         missing = [what for what, value in needed.items() if value is None]
         if camera is None or window_size is None or missing:
             raise InvalidArgumentError(f"VDISource has no {', no '.join(missing)}")
         volume = self._read(image)
-        if prop is None or deferral.deferred:
-            deferral.refuse_target(target or QualityTarget())
-            table = _unclassified(prop)
-        else:
-            # Take the property's functions over the volume's scalars, the same until they change
-            key = (self._volume_key, prop.GetMTime())
-            if self._table is None or key != self._table_key:
-                self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
-                self._table_key = key
-            table = self._table
+        # Take the property's functions over the volume's scalars, the same until they change
+        key = (self._volume_key, prop.GetMTime())
+        if self._table is None or key != self._table_key:
+            self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
+            self._table_key = key
+        table = self._table
         lights = self.GetLights() if table.shading else Lights()
         options = replace(self.GetOptions(), lights=lights)
         # Where lights of the scene shine on it, the volume is lit where it stands now
-        placed = self._placed if lights.of_scene else None
+        placed = self.placed if lights.of_scene else None
         screen = View(camera, window_size)
         generating = (camera, window_size)
         if placed is not None:
             generating = (camera.replace(model_transform=placed), window_size)
+        covered = True
         if self.GetCoverage() == "bounds":
             # The corners of the box of points, model frame: tighter than bounds if rotated
-            corners = np.zeros((8, 3))
-            for at, corner in zip(bounds_corners(image.GetExtent()).tolist(), corners, strict=True):
-                image.TransformIndexToPhysicalPoint(*map(int, at), corner)
+            box = bounds_corners([end for n in volume.dimensions for end in (0, n - 1)])
+            corners = np.column_stack([box, np.ones(8)]) @ volume.index_to_model.T[:, :3]
             wide = covering_view(*generating, corners)
-            generating = wide or generating
-            if warn and wide is None:
-                warn_external(
-                    "coverage='bounds' needs the eye outside the volume, with all of it in "
-                    "front: the VDI covers the current view only (coverage='view'); move the "
-                    "camera back and regenerate for the whole volume"
-                )
+            covered, generating = wide is not None, wide or generating
         metadata, device = self.GetMetadata(), self.GetDevice()
-        content = (self._volume_key, table, options, placed, deferral, target, device, metadata)
+        content = (self._volume_key, table, options, placed, target, device, metadata)
         metadata = {"scalars": volume.name, **metadata}
-        settings = (options, deferral, target, device, metadata, content)
+        settings = (options, target, device, metadata, content, covered)
         return Request(volume, table, screen, generating, *settings)
 
     def _read(self, image: Any) -> Volume:
@@ -471,6 +367,8 @@ class VDISource(OptionMethods, Classifying):
         # The image's time is newer than its arrays', whose values may have been written in place
         key = (array.GetAddressAsString(""), image.GetMTime())
         if self._volume is None or key != self._volume_key:
+            if self.GetInputAlgorithm(0, 0).CheckAbort():
+                raise Cancelled("what is before VDISource was aborted: its data are not whole")
             self._volume, self._volume_key = volume_from_vtk(image, *chosen), key
         return self._volume
 
@@ -481,14 +379,18 @@ class VDISource(OptionMethods, Classifying):
         return goes_on and not self.GetAbortExecute()
 
 
-def _unclassified(prop: Any) -> TransferFunction:
-    """Return what stands for the transfer function where values are kept, of a property or None."""
-    if prop is None:
-        return unclassified("nearest")
-    check_property(prop)
-    if prop.GetShade():
-        raise UnsupportedError(
-            "the volume property is shaded, which needs gradients, and a deferred VDI keeps values "
-            "alone: call ShadeOff(), or leave classification='deferred' out"
-        )
-    return unclassified(INTERPOLATION[prop.GetInterpolationType()])
+def _option(name: str, what: str) -> Any:
+    """Return Set and Get of one of a source's options."""
+
+    def setter(self: VDISource, value: Any) -> None:
+        self.SetOptions(replace(self.GetOptions(), **{name: value}))
+
+    def getter(self: VDISource) -> Any:
+        return getattr(self.GetOptions(), name)
+
+    return named_pair(name, f"`{name}` of :func:`pyvista_vdi.generate`: {what}", setter, getter)
+
+
+for _told in GenerationOptions.declared.values():
+    for _method in _option(_told.name, _told.what) if _told.name != "lights" else ():
+        setattr(VDISource, _method.__name__, _method)

@@ -22,6 +22,7 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkMatrix4x4,
     vtkOpenGLGL2PSHelper,
     vtkVolume,
+    vtkWeakReference,
     weakly,
 )
 
@@ -75,7 +76,7 @@ def _volumes_of(props: Any, assemblies: tuple[Any, ...] = ()) -> Iterator[ShownV
         elif isinstance(prop, vtkVolume):
             mapper = prop.GetMapper()
             driver = getattr(mapper, "driver", None)
-            own = driver if driver is not None and driver.actor is prop else None
+            own = driver if driver is not None and driver.actor() is prop else None
             yield ShownVolume(prop, mapper, own, assemblies)
 
 
@@ -90,12 +91,15 @@ class Window:
         What they have taken.
     of_frame : dict
         What those who draw share within a frame; empty between two.
+    active : vtkWeakReference
+        The renderer that is between its start and its end.
     """
 
     def __init__(self, window: Any) -> None:
         self.number = 0
         self.pace = Pace()
         self.of_frame: dict[Any, Any] = {}
+        self.active = vtkWeakReference()
         self._window = weakly(window)
         self._renderers: list[Callable[[], Any]] = []  # that have drawn a VDI
         self._known: list[Callable[[], Any]] = []
@@ -135,20 +139,20 @@ class Window:
                         window._camera_changed()
 
                 renderer.AddObserver("ActiveCameraEvent", camera_changed)
+                active = self.active  # no cycle through the observers
+                renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
+                renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
             self.of_frame[key] = list(_volumes_of(renderer.GetViewProps()))
         return self.of_frame[key]  # type: ignore[no-any-return]
 
-    @property
     def shown(self) -> list[tuple[Any, ShownVolume]]:
-        """The VDIs of this window, each with the renderer that shows it."""
-        window, there = self._window(), [known() for known in self._renderers]
-        there = [each for each in there if each is not None and window.HasRenderer(each)]
-        return [(r, v) for r in there for v in self.shown_in(r) if v.driver is not None]
-
-    @property
-    def drivers(self) -> list[Any]:
-        """Those of all VDIs in this window."""
-        return list(dict.fromkeys(each.driver for _, each in self.shown))
+        """Return the VDIs of this window, each with the renderer that shows it."""
+        window, found = self._window(), []
+        for known in self._renderers:
+            renderer = known()
+            if renderer is not None and window.HasRenderer(renderer):
+                found += [(renderer, v) for v in self.shown_in(renderer) if v.driver is not None]
+        return found
 
     @property
     def drawing(self) -> bool:
@@ -165,10 +169,15 @@ class Window:
 
     def rate(self, settings: Any) -> float:
         """Return the frames per second to be kept while a hand moves, also before it does."""
-        if settings.target or self.moving:
-            return float(settings.target or self._window().GetDesiredUpdateRate())
+        if settings.target_fps or self.moving:
+            return float(settings.target_fps or self._window().GetDesiredUpdateRate())
         interactor = self._window().GetInteractor()
         return _RATE if interactor is None else max(1.0, interactor.GetDesiredUpdateRate())
+
+    @property
+    def interactor(self) -> Any:
+        """VTK's, or ``None``."""
+        return self._window().GetInteractor()
 
     @property
     def moving(self) -> bool:
@@ -193,8 +202,9 @@ class Window:
         A screenshot draws in tiles, or with a camera of its own; an export of vector graphics has
         a helper installed.
         """
-        return self._keeps_picture() or not self.knows(renderer.GetActiveCamera())
+        return self._keeps_picture or not self.knows(renderer.GetActiveCamera())
 
+    @property
     def _keeps_picture(self) -> bool:
         """Whether this frame is drawn to be kept, whatever its cameras are."""
         exported = vtkOpenGLGL2PSHelper.GetInstance() is not None
@@ -217,7 +227,7 @@ class Window:
         self.number += 1
         # Between two frames only: no frame shows two generations, nor does a picture in tiles
         window = self._window()
-        drivers = self.drivers
+        drivers = dict.fromkeys(each.driver for _, each in self.shown())
         if self.whole_picture:
             for driver in drivers:
                 driver.advance()
@@ -237,12 +247,12 @@ class Window:
 
     def _may_go_without(self) -> bool:
         """Whether a frame may go without multisampling: all VDIs of the window let previews do."""
-        shown = [(each.driver.settings, r) for r, each in self.shown if each.visible]
+        shown = [(each.driver.settings, r) for r, each in self.shown() if each.visible]
         cameras = [known() for known in self._known]
         return bool(shown) and all(
             settings.adjust_multi_samples
             and self.previews(settings)
-            and not self._keeps_picture()
+            and not self._keeps_picture
             and renderer.GetActiveCamera() in cameras
             for settings, renderer in shown
         )

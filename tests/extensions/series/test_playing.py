@@ -45,15 +45,15 @@ def shown(plotter, series, **options):
 
 def test_each_step_is_drawn_as_its_vdi(plotter, series):
     actor = shown(plotter, series)
-    assert (actor.series, actor.time, actor.vdi) == (series, 0.0, series[0])
+    assert (actor.player.collection, actor.player.time, actor.vdi) == (series, 0.0, series[0])
     pictures = []
     for k, now in enumerate(series.times):
-        actor.time = now + 0.1
-        assert (actor.step, actor.time) == (k, now)
+        actor.player.time = now + 0.1
+        assert (actor.player.step, actor.player.time) == (k, now)
         pictures.append(frame(plotter))
         np.testing.assert_array_equal(pictures[-1], picture_of(series[k], plotter))
     assert all(np.abs(b - a).max() > 8 for a, b in pairwise(pictures))
-    actor.step = -2
+    actor.player.step = -2
     np.testing.assert_array_equal(frame(plotter), pictures[-2])
     assert f"time {series.times[-2]:g}" in str(actor.status)
 
@@ -65,23 +65,23 @@ def test_a_damaged_step_of_a_file_leaves_what_was_shown(plotter, series, tmp_pat
             out.append(step)
     (path / "000002.vdi").write_bytes(b"damaged")
     actor = shown(plotter, pvdi.read(path))
-    actor.step = 1
+    actor.player.step = 1
     before = frame(plotter)
     np.testing.assert_array_equal(before, picture_of(series[1], plotter))
-    actor.step = 2
+    actor.player.step = 2
     with pytest.warns(VDIWarning, match=r"000002\.vdi"):
         np.testing.assert_array_equal(frame(plotter), before)
-    actor.step = 3
+    actor.player.step = 3
     np.testing.assert_array_equal(frame(plotter), picture_of(series[3], plotter))
 
 
 def test_closing_while_it_plays_leaves_nothing(no_leaks, series):
     plotter = pv.Plotter(window_size=WINDOW)
     actor = shown(plotter, series)
-    actor.play()
+    actor.player.play()
     frame(plotter)
     plotter.close()
-    assert not actor.playing
+    assert not actor.player.playing
     assert not threads("series")
     del plotter, actor
 
@@ -107,7 +107,7 @@ def test_steps_are_drawn_in_the_look_that_is_given_and_in_what_it_becomes(plotte
     plotter.show(auto_close=False)
     series = pvdi.read(saved)
     for step in (0, 2):
-        actor.step = step
+        actor.player.step = step
         picture = frame(plotter)
         of_one = picture_of(series[step].classified(**LOOK), plotter)
         assert np.abs(picture - of_one).max() <= 1

@@ -41,7 +41,7 @@ def test_each_view_is_drawn_by_the_vdi_nearest_to_it(plotter, made):
         assert actor.vdi is made[nearest]
         np.testing.assert_array_equal(picture, picture_of(made[nearest], plotter))
     assert len(seen) > 3
-    assert actor.vdi_set is made
+    assert actor.collection is made
     x, y = (edge // 2 for edge in plotter.window_size)
     hit, alone = (
         actor.pick(x, y),

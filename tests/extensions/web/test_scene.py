@@ -227,7 +227,7 @@ def test_a_series_beside_a_vdi_and_a_mesh_is_whole_in_the_page_and_plays(
     assert page.evaluate("viewer.series.times") == [0, 1, 2]
     for time in (0, 2):
         page.evaluate("(time) => { viewer.time = time; return viewer.ready.then(() => 0) }", time)
-        actor.time = time
+        actor.player.time = time
         plotter.render()
         assert_as_vtk(page, plotter)
     again = pvdi.read(path)

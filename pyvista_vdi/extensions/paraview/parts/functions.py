@@ -52,11 +52,7 @@ class Functions(Algorithm):
             before.RemoveObserver(self._observers.pop(role))
         self._functions[role] = function
         if function is not None:
-            changed = methodcaller("_function_changed")
-            self._observers[role] = watch(function, self, changed)
-        self.Modified()
-
-    def _function_changed(self) -> None:
+            self._observers[role] = watch(function, self, methodcaller("Modified"))
         self.Modified()
 
     def take_looks(self, name: str, ends: Sequence[float], unit_distance: float) -> None:

@@ -6,12 +6,12 @@ import math
 import re
 
 from pyvista_vdi.model.checks import Number
-from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
+from pyvista_vdi.model.options import GenerationOptions, declared
 
 #: Value of the property View that means the camera properties.
 CAMERA = 1
 
-_DECLARED = declared(GenerationOptions, Deferral)
+_DECLARED = declared(GenerationOptions)
 
 
 def properties(lines: str) -> str:
@@ -142,8 +142,6 @@ Diffuse!        Double 1  -
 Specular!       Double 0  -
 SpecularPower!  Double 1  -
 AmbientOcclusion:SetOcclusion  Int 0  bool  {_sentence("ambient_occlusion")}
-Classification             Int 0       (baked|deferred)  {_sentence("classification")}
-ValueRange!                Double 0 0  -                 {_sentence("value_range", ". 0 0: all")}
 MaxSupersegments         {_number("max_supersegments")}
 SampleDistance:SetStep!  {_number("sample_distance", ". 0: the default")}
 Tolerance!               {_number("tolerance")}

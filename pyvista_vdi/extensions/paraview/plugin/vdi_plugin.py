@@ -74,12 +74,6 @@ class VDISourceFilter(Looking, Functions, vtk_pipeline.VDISource):
 
     SetAzimuth, GetAzimuth = accessors("azimuth", "by how much the view is turned, degrees", 0.0)
     SetElevation, GetElevation = accessors("elevation", "by how much it is lifted, degrees", 0.0)
-    SetClassification, _deferred = accessors("deferred", "whether scalars are stored", 0)
-    SetValueRange, _value_range = accessors(
-        "value_range",
-        "the scalars that are stored; two that are equal mean all",
-        check=lambda low, high: (low, high) if low != high else None,
-    )
     SetInterpolation = _of_looks("SetInterpolationType")
     SetShade = _of_looks("SetShade")
     SetAmbient = _of_looks("SetAmbient")
@@ -99,10 +93,6 @@ class VDISourceFilter(Looking, Functions, vtk_pipeline.VDISource):
         """Set the length of a step along a ray; 0 is the default one."""
         self.SetSampleDistance(distance or None)
 
-    def _function_changed(self) -> None:
-        if not self._deferred():  # else it decides nothing here
-            super()._function_changed()
-
     def _execute(self, inputs: Any, outputs: Any) -> None:
         # A script may connect what ParaView's menus do not offer
         image = require_image(vtkDataObject.GetData(inputs[0], 0))
@@ -118,7 +108,6 @@ class VDISourceFilter(Looking, Functions, vtk_pipeline.VDISource):
         volume = self._read(image)
         self.take_looks(volume.name, ends, volume.default_unit_distance)
         self.SetVolumeProperty(self.looks)
-        self.SetDeferral(*("deferred", self._value_range()) if self._deferred() else ())
         super()._execute(inputs, outputs)
 
 
