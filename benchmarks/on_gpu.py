@@ -23,7 +23,7 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.measure.bench import take_turns
 
 #: Methods of a runtime that may copy, or wait for the device.
-METHODS = ("upload", "write", "fill", "buffer", "result", "target", "download", "finish")
+METHODS = ("upload", "write", "fill", "buffer", "result", "download", "finish")
 
 
 def calls(options: argparse.Namespace) -> Iterator[tuple[Any, ...]]:
