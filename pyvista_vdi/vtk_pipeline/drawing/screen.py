@@ -83,25 +83,35 @@ class NoDepth(_Texture):
         self._texture.Activate()
 
 
-_DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
-
-#: A sampler takes the number of its texture unit, and VTK knows of no custom uniform of that kind:
-#: it sets an integer, and declares it, which is no declaration of the sampler under another name.
-_UNIFORMS = """
-#define vdiImage vdiImageUnit
-//VTK::CustomUniforms::Dec
-#undef vdiImage
-"""
-
 #: Where the viewport is in the framebuffer, pixels: left edge, upper edge, 1 / width, -1 / height.
 _VIEWPORT = "vdiViewport"
 
-#: The image is premultiplied RGBA of the whole viewport, top row first. The pixel's place is taken
-#: from its number: from a vertex position it would take three matrices, per pixel.
-#: finalizeRayCast keeps window and level, and selections.
-_LOOKUP = f"""
+#: What stands in place of VTK's ray caster, in whose shader VTK looks for tags whenever a headlight
+#: moves: so short a text takes no time. The image is premultiplied RGBA of the whole viewport, top
+#: row first. The pixel's place is taken from its number: from a vertex position it would take three
+#: matrices, per pixel. Window and level, and selections, are as in VTK's.
+#: A sampler takes the number of its texture unit, and VTK knows of no custom uniform of that kind:
+#: it sets an integer, and declares it, which is no declaration of the sampler under another name.
+_LOOKUP = f"""//VTK::System::Dec
+//VTK::Output::Dec
+in vec3 ip_textureCoords;
+in vec3 ip_vertexPos;
+vec4 g_fragColor;
+uniform sampler2D vdiImage;
+uniform float in_scale;
+uniform float in_bias;
+//VTK::Picking::Dec
+#define vdiImage vdiImageUnit
+//VTK::CustomUniforms::Dec
+#undef vdiImage
+
+void main()
+{{
   g_fragColor = texture(vdiImage, (gl_FragCoord.xy - {_VIEWPORT}.xy) * {_VIEWPORT}.zw);
-  finalizeRayCast();
+  //VTK::Picking::Exit
+  g_fragColor.rgb = g_fragColor.rgb * in_scale + in_bias * g_fragColor.a;
+  gl_FragData[0] = g_fragColor;
+}}
 """
 
 #: For boxes that float32 cannot place: one about the origin, whose front or back face, whichever is
@@ -112,24 +122,10 @@ _FILL = """
 
 _POSITION = "//VTK::ComputeClipPos::Impl"
 
-#: What takes the place of VTK's tags: nothing where only its ray caster needs it, and render passes
-#: would add to it.
-_REPLACED = {
-    "//VTK::Base::Dec": _DECLARATION,
-    "//VTK::CustomUniforms::Dec": _UNIFORMS,
-    "//VTK::CallWorker::Impl": _LOOKUP,
-    "//VTK::ComputeLighting::Dec": "",
-    "//VTK::ComputeColor::Dec": "",
-    "//VTK::Shading::Impl": "",
-    "//VTK::RenderToImage::Impl": "",
-}
-
 
 def show_image(actor: Any) -> None:
     """Make an actor's shader look its colours up in an image of the viewport."""
-    shader = actor.GetShaderProperty()
-    for tag, text in _REPLACED.items():
-        shader.AddFragmentShaderReplacement(tag, True, text, False)
+    actor.GetShaderProperty().SetFragmentShaderCode(_LOOKUP)
 
 
 def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:
