@@ -17,7 +17,6 @@ BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 CHECKOUT = Path(os.environ.get("PYVISTA_VDI_CHECKOUT") or BENCHMARKS.parent)
 if not BENCHMARKS.is_dir():
     pytest.skip("the benchmarks are not beside the tests", allow_module_level=True)
-pytest.importorskip("tqdm")
 sys.path.insert(0, str(BENCHMARKS))
 
 
