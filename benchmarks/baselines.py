@@ -160,7 +160,7 @@ class WorldRays:
         planes = [
             *rays.box_planes(pixel_rays, vdi.bounds),
             *(u, v, self._wide * d - u, self._high * d - v),
-            *rays.eye_plane(camera, pixel_rays),
+            *rays.view_planes(camera, pixel_rays, ()),
         ]
         if not self._parallel:
             planes.append(depth - self._nearest * np.eye(6)[0])

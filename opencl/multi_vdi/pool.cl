@@ -3,18 +3,12 @@
 //
 // A segment is a piece of a ray in one supersegment: t where it begins and ends (view depth of V_N
 // less the frame's reference depth, world units), optical depth, straight RGB. A ray's streams lie
-// behind one another in its slots.
-//
-// -D SEGMENT_ROWS=0, 1  how they lie: rays in blocks of 16, component by component, so that
-//                       neighbouring work-items touch neighbouring words; or ray by ray, a
-//                       segment's components together, so that a vector's lanes are loaded and
-//                       stored in whole rows, as sixteen lanes are (lib/lanes.cl): a ray then has
-//                       SPARE_SLOTS
+// behind one another in its slots, a segment's numbers together, so that a vector's lanes are loaded
+// and stored in whole rows.
 #include "lib/transpose.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #define BOX_PLANES 6 // of a VDI's bounds: the first of its planes to clip to
-#define RAY_BLOCK 16
 #define MAX_OPTICAL_DEPTH 1e30f // more cannot be told from opaque, and a part of it is a number
 
 // t behind which nothing is seen because of the VDIs before, as a VDI's own t: not less, by what
@@ -30,10 +24,7 @@ typedef struct {
 // The part of the pool that a work-item's rays have, from its first one on.
 inline __global float *pool_of(__global float *pool, int first_ray, int capacity)
 {
-    if (SEGMENT_ROWS)
-        return pool + (size_t)first_ray * (capacity + SPARE_SLOTS) * SEGMENT_SIZE;
-    return pool + (size_t)(first_ray / RAY_BLOCK) * capacity * (SEGMENT_SIZE * RAY_BLOCK) +
-           first_ray % RAY_BLOCK;
+    return pool + (size_t)first_ray * (capacity + SPARE_SLOTS) * SEGMENT_SIZE;
 }
 
 #if LANES == 16
@@ -87,29 +78,20 @@ inline Segments load_segments(__global const float *rows, Int slots, int capacit
     return segments;
 }
 #else
-#define FLOATS_APART (SEGMENT_ROWS ? 1 : RAY_BLOCK)
-#define SLOT(slot) ((slot) * (SEGMENT_SIZE * FLOATS_APART))
-
 inline void store_segments(__global float *rows, int slot, int capacity, const Segments *segment,
                            bool chosen)
 {
-    __global float *const at = rows + SLOT(slot);
+    __global float *const at = rows + slot * SEGMENT_SIZE;
     if (!chosen || slot >= capacity)
         return;
-    at[0] = segment->from;
-    at[FLOATS_APART] = segment->to;
-    at[2 * FLOATS_APART] = segment->optical_depth;
-    at[3 * FLOATS_APART] = segment->color.x;
-    at[4 * FLOATS_APART] = segment->color.y;
-    at[5 * FLOATS_APART] = segment->color.z;
+    vstore3((float3)(segment->from, segment->to, segment->optical_depth), 0, at);
+    vstore3(segment->color.xyz, 1, at);
 }
 
 inline Segments load_segments(__global const float *rows, int slot, int capacity)
 {
-    __global const float *const at = rows + SLOT(slot);
-    const Segments segment = {
-        at[0], at[FLOATS_APART], at[2 * FLOATS_APART],
-        (float4)(at[3 * FLOATS_APART], at[4 * FLOATS_APART], at[5 * FLOATS_APART], 0.0f)};
+    __global const float *const at = rows + slot * SEGMENT_SIZE;
+    const Segments segment = {at[0], at[1], at[2], (float4)(vload3(1, at), 0.0f)};
     return segment;
 }
 #endif

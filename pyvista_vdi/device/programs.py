@@ -6,12 +6,10 @@ with ``#line`` marks, and compiled once per device, source and options; threads 
 
 import contextlib
 import hashlib
-import itertools
 import logging
 import operator
 import os
 import re
-import sqlite3
 import threading
 from collections.abc import Mapping
 from functools import cache
@@ -70,24 +68,20 @@ class Parameter(NamedTuple):
         raises, for what is not of its type.
         """
         dtype = self.dtype
-        if self.kind.endswith("*"):
-            if dtype is not None and self.kind.startswith("local "):
-                return cl.LocalMemory(operator.index(value) * dtype.itemsize)
-            if value is not None:
-                raise TypeError
+        pointer, local = self.kind.endswith("*"), self.kind.startswith("local ")
+        if pointer and not local and value is None:
             return _NULL
-        if dtype is None:
+        if value is None or dtype is None or pointer != local:
             raise TypeError
+        if local:
+            return cl.LocalMemory(operator.index(value) * dtype.itemsize)
         if dtype.names is not None:
             if value.keys() != set(dtype.names):
                 raise TypeError(f"fields missing or unknown: {value.keys() ^ set(dtype.names)}")
             return np.array(tuple(map(value.__getitem__, dtype.names)), dtype)
-        if value is None:
-            raise TypeError
-        converted = np.array(value, dtype.base) if dtype.shape else dtype.type(value)
-        if converted.shape != dtype.shape or (
-            dtype.base.kind != "f" and np.any(converted != value)
-        ):
+        converted = np.array(value, dtype.base)
+        whole = dtype.base.kind != "f"
+        if converted.shape != dtype.shape or (whole and np.any(converted != value)):
             raise TypeError
         return converted
 
@@ -167,10 +161,7 @@ _INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]')
 
 def read_resource(path: str) -> str:
     """Return the text of a file of the package ``pyvista_vdi.opencl``: ``"lib/rays.cl"``, say."""
-    try:
-        return files("pyvista_vdi.opencl").joinpath(path).read_text(encoding="utf-8")
-    except (FileNotFoundError, IsADirectoryError) as exc:
-        raise KernelBuildError(f"no kernel file {path!r} in pyvista_vdi.opencl") from exc
+    return files("pyvista_vdi.opencl").joinpath(path).read_text(encoding="utf-8")
 
 
 @cache
@@ -184,14 +175,10 @@ def expand(path: str | Path) -> str:
     Each file is expanded where it is first included, outside ``#if``, and left out afterwards, so
     files need no include guards. A string is a path inside ``pyvista_vdi.opencl``; a Path is any
     file on disk (tests and users' own kernels), whose includes are taken from there.
-    KernelBuildError if a file is missing.
     """
     if isinstance(path, str):
         return _expanded(path)
-    try:
-        return _with_includes(path.name, path.read_text(encoding="utf-8"))
-    except OSError as exc:
-        raise KernelBuildError(f"the kernel file {str(path)!r} cannot be read: {exc}") from exc
+    return _with_includes(path.name, path.read_text(encoding="utf-8"))
 
 
 def _with_includes(name: str, text: str) -> str:
@@ -215,10 +202,7 @@ def _with_includes(name: str, text: str) -> str:
     return "\n".join([*definitions(), *lines]) + "\n"
 
 
-LOG_LINES_SHOWN = 30
-
 _logger = logging.getLogger(__name__)
-_program_numbers = itertools.count(1)
 _kernel_lock = threading.RLock()
 
 
@@ -247,11 +231,7 @@ class Kernel:
         cl: Any = opencl()
         # pyopencl makes Python code for each, under names that it takes for free in two threads
         with _kernel_lock:
-            try:
-                return cl.Kernel(self._program, self.name)
-            except sqlite3.Error:  # the file in which it keeps that code cannot be used
-                cl._PYOPENCL_NO_CACHE = True
-                return cl.Kernel(self._program, self.name)
+            return cl.Kernel(self._program, self.name)
 
 
 def build(context: Any, device: Any, path: str, source: str, options: tuple[str, ...]) -> Any:
@@ -266,33 +246,36 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
     call = {"options": joined.encode(), "devices": [device]}
     kept = import_module("pyopencl.characterize").has_src_build_cache(device)  # by the driver
     place = None if kept else _place(device, joined, source)
-    binary = _read(place)
-    if binary is not None:
-        with contextlib.suppress(cl.Error):  # made for another processor of that name
-            program = cl._cl._Program(context, [device], [binary])
+    with contextlib.suppress(cl.Error, OSError):  # made for another processor of that name
+        if place is not None and place.exists():
+            program = cl._cl._Program(context, [device], [place.read_bytes()])
             program._build(**call)
             return cl.Program(program)
 
     program = cl._cl._Program(context, source)
-    level = logging.INFO if next(_program_numbers) == 1 else logging.DEBUG
-    _logger.log(level, "compiling kernels: %s", path)
+    _logger.debug("compiling kernels: %s", path)
     try:
         program._build(**call)
     except cl.Error as exc:
         log = _log(program, device) or str(exc)
-        lines = [line for line in log.splitlines() if line.strip()]
-        if len(lines) > LOG_LINES_SHOWN:
-            left_out = len(lines) - LOG_LINES_SHOWN
-            lines[LOG_LINES_SHOWN:] = [f"... {left_out} more lines in the error's .log"]
         raise KernelBuildError(
             f"{path} does not compile on {device.platform.name.strip()} / "
-            f"{device.name.strip()} with {joined}:\n" + "\n".join(lines),
+            f"{device.name.strip()} with {joined}:\n{log}",
             log=log,
             options=joined,
             source=source,
         ) from exc
     _logger.debug("%s: %s", path, _log(program, device))
-    _write(place, program)
+    if place is not None:
+        (binary,) = program.get_info(cl.program_info.BINARIES)
+        with contextlib.suppress(OSError):  # a full disk, say: it is compiled again
+            place.parent.mkdir(exist_ok=True)
+            new = place.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
+            try:
+                new.write_bytes(binary)
+                new.replace(place)  # whole, or not at all
+            finally:
+                new.unlink(missing_ok=True)
     return cl.Program(program)
 
 
@@ -305,30 +288,6 @@ def _place(device: Any, options: str, source: str) -> Path | None:
     driver = [getattr(each, name) for each in (device.platform, device) for name in names]
     key = repr((driver, device.driver_version, options, source))
     return folder and folder / "programs" / hashlib.sha256(key.encode()).hexdigest()
-
-
-def _read(place: Path | None) -> bytes | None:
-    """Return a program that was kept, unless it is damaged."""
-    try:
-        content = place.read_bytes() if place else b""
-    except OSError:
-        return None
-    return content[32:] if hashlib.sha256(content[32:]).digest() == content[:32] else None
-
-
-def _write(place: Path | None, program: Any) -> None:
-    """Keep a compiled program."""
-    if place is None:
-        return
-    (binary,) = program.get_info(opencl().program_info.BINARIES)
-    with contextlib.suppress(OSError):  # a full disk, say: it is compiled again
-        place.parent.mkdir(exist_ok=True)
-        new = place.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
-        try:
-            new.write_bytes(hashlib.sha256(binary).digest() + binary)
-            new.replace(place)  # whole, or not at all
-        finally:
-            new.unlink(missing_ok=True)
 
 
 def _log(program: Any, device: Any) -> str:

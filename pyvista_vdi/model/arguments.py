@@ -189,8 +189,10 @@ def records_of(
     ``settings``, where they are among it, say some of them, which are taken by themselves only
     where they are to be ``flat``; ``defaults`` are others than declared.
     """
-    options = {name: told for each in records for name, told in each.declared.items()}
-    hidden = {name: told for name, told in options.items() if told.setting}
+    options: dict[str, Option] = {}
+    for each in records:
+        options.update(each.declared)
+    hidden = [name for name, told in options.items() if told.setting]
     settings = given.pop("settings", None)
     if not isinstance(settings, Settings | None):
         raise InvalidArgumentTypeError(f"settings must be a pyvista_vdi.Settings; got {settings!r}")
@@ -200,8 +202,9 @@ def records_of(
             f"{', '.join(sorted(hidden))}: leave it out"
         )
     said = {**(defaults or {}), **(settings.said if settings else {})}
-    direct = options if flat else options.keys() - hidden.keys()
-    said |= {name: given.pop(name) for name in direct if name in given}
+    for name in options:
+        if name in given and (flat or name not in hidden):
+            said[name] = given.pop(name)
     return [each.checked(**{n: said[n] for n in each.declared if n in said}) for each in records]
 
 

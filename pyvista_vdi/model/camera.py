@@ -288,18 +288,17 @@ class Camera:
                 f"the camera's position and focal point are {wrong}, {self.position} and "
                 f"{self.focal_point}: move one of them"
             )
-        # sin of the angle between them; below 1e-12 float64 cannot tell which way is right
-        up = np.asarray(self.view_up)
-        across = _cross(_unit(forward), _unit(up)) if up.any() else np.zeros(3)
-        if math.sqrt(across @ across) < 1e-12:
-            raise InvalidCameraError(
-                f"view_up {self.view_up} is zero or parallel to the direction of projection "
-                f"{tuple(_unit(forward).tolist())}: choose another up direction"
-            )
         # By a power of two, which rounds nothing: squares may overflow
         forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
         forward = forward / math.sqrt(forward @ forward)
-        right = _cross(forward, _unit(up))
+        up = np.asarray(self.view_up)
+        right = _cross(forward, _unit(up)) if up.any() else np.zeros(3)
+        # sin of the angle between them; below 1e-12 float64 cannot tell which way is right
+        if math.sqrt(right @ right) < 1e-12:
+            raise InvalidCameraError(
+                f"view_up {self.view_up} is zero or parallel to the direction of projection "
+                f"{tuple(forward.tolist())}: choose another up direction"
+            )
         right /= math.sqrt(right @ right)
         axes = np.array([right, _cross(right, forward), forward])
         axes.setflags(write=False)

@@ -57,8 +57,6 @@ def _kept_volume(image: Any, scalars: str | None, preference: str) -> Volume:
     """Return the volume that a VTK image is, the same until the image is told to be modified."""
     from_vtk = registry.method("Volume.from_vtk")
     matrix = getattr(image, "GetDirectionMatrix", None)
-    if not hasattr(image, "GetMTime"):
-        return from_vtk(image, scalars, preference)  # type: ignore[no-any-return] # says what it is
     made_of = (scalars, preference, image.GetMTime(), matrix and matrix().GetMTime())
     kept = _kept.get(id(image))
     if kept is not None and kept[0] == made_of:
@@ -92,11 +90,6 @@ def as_vdi(vdi: Any) -> VDI:
     raise InvalidVDIError(
         f"expected a VDI or its VTK form (a vtkImageData); got {_described(vdi)}{hint}"
     )
-
-
-def as_any_vdi(vdi: Any) -> VDI | DeferredVDI:
-    """Return what :func:`as_vdi` returns, or a VDI that keeps values as it is."""
-    return vdi if isinstance(vdi, DeferredVDI) else as_vdi(vdi)
 
 
 def _described(thing: object) -> str:

@@ -119,7 +119,7 @@ class FrameRequest:
     depth at which each ray ends, world units, (height, width), top row first, inf where nothing is
     opaque; it is checked where rays are made of it. ``out`` is an array for the picture, float32
     (height, width, 4), C-contiguous: a CPU device draws into it without a copy if it begins at a
-    multiple of 4096 bytes (:func:`pyvista_vdi.device.aligned_empty`).
+    multiple of 4096 bytes (:func:`pyvista_vdi.model.host_memory.aligned_empty`).
     """
 
     camera: Camera

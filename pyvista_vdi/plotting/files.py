@@ -14,7 +14,6 @@ from pyvista_vdi.io import read, write
 from pyvista_vdi.io.axes import to_world
 from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, head_of
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.inputs import as_any_vdi
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.volumes import as_grid
 from pyvista_vdi.vtk_pipeline import vtk
@@ -49,9 +48,8 @@ def read_vdi(path: str, **options: Any) -> pv.ImageData:
     InvalidArgumentError
         If an option is not one of the file's format.
     """
-    found = read(path, **options)
-    vdi = found[0] if isinstance(found, VDICollection) else found
-    return pv.wrap(vdi_to_image(as_any_vdi(vdi)))
+    found: Any = read(path, **options)
+    return pv.wrap(vdi_to_image(found[0] if isinstance(found, VDICollection) else found))
 
 
 def write_vdi(dataset: Any, path: str, **options: Any) -> None:

@@ -75,7 +75,7 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     # What rays cross of one of several VDIs
     if scene.segments:
         lanes = LANES if device.is_cpu and suit_blocks else 1
-        switches = {**lists, **walk, "SEGMENT_ROWS": int(device.is_cpu), "LANES": lanes}
+        switches = {**lists, **walk, "LANES": lanes}
         return ChosenKernel(
             ("multi_vdi/segments.cl", "segments"), switches, 0, GROUP // lanes, {}, lanes
         )
@@ -134,6 +134,5 @@ def choose_merge(device: Runtime, scenes: Sequence[Scene]) -> ChosenKernel:
     """Return the variant that merges what rays cross of several VDIs."""
     compensated = summation(sum(scene.prepared.most_media for scene in scenes))
     lanes = LANES if device.is_cpu and compensated < 2 else 1
-    switches = {"STREAMS": len(scenes), "COMPENSATED": compensated}
-    switches |= {"SEGMENT_ROWS": int(device.is_cpu), "LANES": lanes}
+    switches = {"STREAMS": len(scenes), "COMPENSATED": compensated, "LANES": lanes}
     return ChosenKernel(("multi_vdi/merge.cl", "merge"), switches, 0, GROUP // lanes, {}, lanes)

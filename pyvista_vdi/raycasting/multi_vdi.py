@@ -366,7 +366,7 @@ class _MergedCells:
         """Draw cells whose rays have room, and return how many slots those of each have needed."""
         runtime, streams = self._runtime, len(self._walks)
         room = _POOL_BYTES_CPU if runtime.is_cpu else _POOL_BYTES
-        ray_bytes = 4 * SEGMENT_SIZE * (slots + (SPARE_SLOTS if runtime.is_cpu else 0))
+        ray_bytes = 4 * SEGMENT_SIZE * (slots + SPARE_SLOTS)
         most = min(max(1, room // (CELL_ITEMS * ray_bytes)), len(cells))  # cells of a band
         rays = most * CELL_ITEMS
         with (

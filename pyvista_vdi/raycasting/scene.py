@@ -131,17 +131,16 @@ class Scene:
         planes = [
             *rays.box_planes(pixel_rays, prepared.bounds),
             *_viewport_planes(prepared, coordinates),
-            *rays.eye_plane(camera, pixel_rays),
-            *rays.user_planes(camera, pixel_rays, options.clipping_planes),
+            *rays.view_planes(camera, pixel_rays, options.clipping_planes),
             *cropped.planes,
         ]
-        pack = rays.packed_double_float if prepared.double_float else rays.packed
+        forms = [*coordinates, *direction, *planes, *cropped.forms]
         return cls(
             prepared,
             camera,
             size,
             options,
-            pack([*coordinates, *direction, *planes, *cropped.forms]),
+            rays.packed(forms, prepared.double_float),
             len(planes),
             rays.checked_opaque_depth(request.opaque_depth, size, pixel_rays),
             pixel_rays.reference_depth,

@@ -16,7 +16,7 @@ from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.float32_limits import MOST_STEPS, enters_far_away
-from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed, packed_double_float
+from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed
 from pyvista_vdi.model.render_options import Planes
 from pyvista_vdi.model.volume import Grid
 
@@ -58,8 +58,7 @@ class MarchForms:
 
     def packed(self, *more: Floats) -> NDArray[np.float32]:
         """Return the forms, and more of the same rays, as the kernels read them."""
-        pack = packed_double_float if self.double_float else packed
-        return pack([*self.forms, *more])
+        return packed([*self.forms, *more], self.double_float)
 
 
 @dataclass(frozen=True)
@@ -83,8 +82,7 @@ class GridRays:
             far = -form
             far[0] += points - 1
             planes += [form, far]
-        planes += rays.eye_plane(camera, pixel_rays)
-        planes += rays.user_planes(camera, pixel_rays, clipping_planes)
+        planes += rays.view_planes(camera, pixel_rays, clipping_planes)
         reach = rays.largest_value(camera, window_size, self.grid.bounds, index)
         two_floats = enters_far_away(reach, max(self.grid.dimensions))
         return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), two_floats)

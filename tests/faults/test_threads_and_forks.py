@@ -77,7 +77,8 @@ def test_one_vdi_drawn_by_many_threads(runtime):
 
 FORK = """
 import gc, os
-from pyvista_vdi.device import aligned_empty, list_devices
+from pyvista_vdi.device import list_devices
+from pyvista_vdi.model.host_memory import aligned_empty
 from drawing import render_vdi
 
 runtime = get_runtime(sys.argv[1])

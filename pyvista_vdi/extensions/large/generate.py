@@ -20,7 +20,6 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, cuts_of
 from pyvista_vdi.extensions.large.passes import BlockSummary, Piece, Rows, Task
 from pyvista_vdi.generation.generate import made_from, report
-from pyvista_vdi.generation.list_arrays import require_room
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.packing import Arrays
 from pyvista_vdi.model.types import ClientLike
@@ -46,7 +45,6 @@ def generate_in_blocks(
     chunk.
     """
     volume, limit = request.volume, request.options.memory_limit
-    require_room(0, request.window_size)
     if limit is not None:
         block_bytes = min(block_bytes, limit // _BLOCKS_IN_LIMIT)
     array: Any = volume.array
@@ -129,10 +127,10 @@ def vdi_of(task: Task, request: GenerationRequest, rows: Sequence[Rows], device_
     asked = request.replace(transfer_function=task.transfer_function, options=task.options)
     made_by = made_from(asked, task.rays, device_name)
     return made_vdi(
-        task.camera,
-        task.size,
         Arrays(offsets, front, back, color, depth),
-        task.blocks.grid.bounds,
+        camera=task.camera,
+        window_size=task.size,
+        bounds=task.blocks.grid.bounds,
         depth_origin=task.rays.forms(task.camera, task.size).rays.reference_depth,
         metadata={**made_by, "blocks": list(task.blocks.counts), **request.metadata},
     ).with_precision(task.options.precision)

@@ -50,7 +50,7 @@ from pyvista_vdi.model.packing import (
     Packed8,
     check_precision,
 )
-from pyvista_vdi.model.vdi import VDI, with_arrays
+from pyvista_vdi.model.vdi import VDI, made_vdi
 
 #: The first bytes: a ZIP member's local header, whose name stands at byte 30.
 _SIGNATURE = b"PK\x03\x04"
@@ -179,7 +179,7 @@ class _OpenFile:
             about: dict[str, Any] = {"depth_origin": info.depth_origin, "metadata": info.metadata}
             vdi = VDI(info.camera, info.window_size, *arrays, info.bounds, **about)
             if packing is not None:
-                vdi = with_arrays(vdi, replace(packing, offsets=vdi.offsets))
+                vdi = made_vdi(replace(packing, offsets=vdi.offsets), vdi)
             return vdi if info.deferred is None else DeferredVDI(vdi, info.deferred)
         except DamagedChunkError as error:
             self._refuse(str(error))

@@ -182,7 +182,7 @@ class VolumeFormat(NamedTuple):
 
 
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_VTK = (b"# vtk DataFile", b"<VTKFile")
+_VTK = (b"# vtk DataFile",)  # of XML the name says which
 _TABLE: Any = (
     ("NRRD", ".nrrd .nhdr", nrrd, "nrrd", "", (b"NRRD0",)),
     ("NIfTI", ".nii .nii.gz .hdr .img .img.gz", nifti, "SimpleITK"),

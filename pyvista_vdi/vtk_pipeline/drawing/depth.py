@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.device import aligned_empty
+from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Image, consumers, depths_of
 from pyvista_vdi.vtk_pipeline.vtk import (
     VTK_FLOAT,

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidVolumeError, VDIError
 from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.view import coverage
@@ -167,8 +168,8 @@ class Driver(Planner):
         window.pace.drawn(sized.size, sized.full_size, seconds, sized.way, sized.effort)
         # A volume's first picture has kernels compiled and voxels sent to the device
         if sized.volume is None or sized.volume.pictures > 1:
-            pixels = sized.covered_by(sized.bounds)
-            self.costs = self.costs.took(sized.way, sized.angle, pixels, seconds)
+            of = (sized.way, sized.angle, sized.covered_by(sized.bounds), seconds)
+            self.costs = self.costs.took(*of, gpu=not get_runtime(self.device).is_cpu)
         elif self.seen is not None and self.costs.volume is None:
             coarse, taken = frame.coarser(reduced(frame.full_size, FLOOR)), []
             for _ in range(_TRIALS):
@@ -195,16 +196,16 @@ class Driver(Planner):
         if frame.full or not settings.previews:
             window.knows(renderer.GetActiveCamera())
         elif not window.takes_picture(renderer):
-            each = self.costs.volume
-            known = frame.volume is not None and each is not None
-            seconds = each * frame.covered_by(frame.bounds) if known else None  # type: ignore[operator]
+            each, expected = self.costs.volume, None
+            if frame.volume is not None and each is not None:
+                expected = each * frame.covered_by(frame.bounds) + self.costs.fixed
             share = window.pace.share(
                 window.rate(settings),
                 math.prod(frame.full_size),
                 min(1.0, 1 / frame.mapper.GetMaximumImageSampleDistance() ** 2),
                 frame.way,
                 effort=frame.effort,
-                expected=seconds,
+                expected=expected,
             )
         return reduced(frame.full_size, min(share, 1 / settings.image_distance**2))
 

@@ -15,7 +15,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import bounds_corners
-from pyvista_vdi.quality.costs import RenderMode, rise
+from pyvista_vdi.quality.costs import RenderMode
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, renderer_view, size_of
 from pyvista_vdi.vtk_pipeline.interaction.window import Window
@@ -104,7 +104,7 @@ class Frame:
 
     def showing(self, seen: Any, **known: Any) -> Frame:
         """Return the frame of this VDI, or volume, with all that its mapper says of its looks."""
-        settings = self.mapper.driver.settings
+        settings, costs = self.mapper.driver.settings, self.mapper.driver.costs
         options = RenderOptions(
             clipping_planes=self._clipping_planes(seen.bounds),
             cropping=self.mapper,
@@ -115,7 +115,7 @@ class Frame:
         if not isinstance(seen, VDI):
             return replace(self, volume=seen, **known)
         angle = angle_from_generating_view(seen, self.view.camera)
-        return replace(self, vdi=seen, angle=angle, effort=rise(angle), **known)
+        return replace(self, vdi=seen, angle=angle, effort=costs.rise(angle), **known)
 
     @property
     def key(self) -> Any:

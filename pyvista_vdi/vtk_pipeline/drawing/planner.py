@@ -211,7 +211,7 @@ class Planner:
         if wanted is not None:
             content = wanted.content
             if watched and each is not None and settings.target_fps != 0:
-                seconds = each * frame.covered_by(wanted.volume.bounds)
+                seconds = each * frame.covered_by(wanted.volume.bounds) + self.costs.fixed
                 late = window.pace.late(seconds, window.rate(settings))
             if self._refused is not None and content == self._refused[0]:
                 volume = self._refused[1]
