@@ -116,7 +116,7 @@ class Task:
             request.camera,
             request.window_size,
             request.transfer_function.replace(unit_distance=unit),
-            GenerationOptions.of(options, {"sample_distance": step}),
+            replace(options, sample_distance=step),
             scalar_range,
             rays,
             request.device,

@@ -165,7 +165,7 @@ class Planner:
         if self.settings.regenerate == "auto":
             cone = vdi.metadata.get("view_cone")
             cone = cone if isinstance(cone, int | float) else _VIEW_CONE
-            for cause, message in lacking(self._as_made(vdi, frame), cone, source.remedy):
+            for cause, message in lacking(self._as_made(vdi, frame), cone):
                 # Once for all VDIs of one view, such as the steps of a series
                 self.warn(message, cause=(cause, (vdi.camera, vdi.window_size)))
         parts = source.parts()
@@ -272,7 +272,7 @@ class Planner:
                 for_view = not (seen.stale or seen.chosen)
                 self.making = Making(request.content, planned.make, for_view)
                 self._asked = request
-                self.worker.put(vdi_job(request.generation, request.target))
+                self.worker.put(vdi_job(request, request.target))
         if planned.estimate:
             self._estimate(source, seen.view)
         if planned.update:
@@ -346,12 +346,8 @@ class Planner:
 
     def _complain(self, error: BaseException) -> None:
         """Say once that a VDI cannot be made."""
-        said = None if self.input is None else self.input.complaint(error)
-        usual = (
-            f"the VDI cannot be made anew: {type(error).__name__}: {error}; what was shown stays, "
-            "and actor.regenerate() tries again"
-        )
-        self.warn(said or usual, error)
+        said = f"another VDI cannot be made: {type(error).__name__}: {error}; what was shown stays"
+        self.warn(f"{said}, and actor.regenerate() tries again", error)
 
     def warn(
         self, message: str, error: BaseException | None = None, cause: Hashable = None
@@ -429,7 +425,7 @@ class Planner:
                 if source.stamp() not in self.failed:
                     self._update(source)
         elif seen is not None:
-            return source.of_view(source.view_for(*seen))
+            return source.source.UpdateFromInput(source.view_for(*seen))
         return source.last()
 
     def vdi_to_pick(self, frame: Frame) -> VDI | None:
