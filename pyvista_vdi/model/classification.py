@@ -180,16 +180,10 @@ class Classification(Look, ArrayChoice):
     def require_no_look(self) -> None:
         """Refuse a look where values are kept to be classified afterwards."""
         given = {*self.given} & {*Look.declared, *IN_PLACE} - {"interpolation"}
-        if "shade" in given:
-            raise UnsupportedError(
-                "shade=True needs the volume's gradients, which a deferred VDI does not keep: "
-                "leave shade out, or classification='deferred'"
-            )
         if given:
-            names = ", ".join(sorted(given))
             raise InvalidArgumentError(
-                f"classification='deferred' keeps values, whatever their look: give {names} to "
-                "classified() of what is returned"
+                "classification='deferred' keeps values, whatever their look, and no gradients to "
+                f"shade by: give {', '.join(sorted(given))} to classified() of what is returned"
             )
 
     def transfer_function_of(self, volume: Volume) -> TransferFunction:
