@@ -53,11 +53,9 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
         """Bring the output up to date, and raise what went wrong."""
         self._python_waits = True
         try:
-            if args:
-                super().Update(*args)
-                done = True
-            else:  # what vtkAlgorithm.Update() does, which does not say whether it went well
-                done = self.GetExecutive().Update(0 if self.GetNumberOfOutputPorts() else -1)
+            # What vtkAlgorithm.Update() does, which does not say whether it went well
+            port = 0 if self.GetNumberOfOutputPorts() else -1
+            done = self.GetExecutive().Update(*(args or (port,)))
         finally:
             self._python_waits = False
         error, self._error = self._error, None

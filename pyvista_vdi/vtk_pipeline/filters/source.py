@@ -246,7 +246,8 @@ class VDISource(SceneAlgorithm):
         The volume and its property are shared; what is set of one is not set of the other.
         """
         other = VDISource()
-        other.SetInputConnection(self.GetInputConnection(0, 0))
+        if self.GetNumberOfInputConnections(0) > 0:
+            other.SetInputConnection(self.GetInputConnection(0, 0))
         other.SetVolumeProperty(self.GetVolumeProperty())
         other.lit_by.Set(self.lit_by.Get())
         other._set, other.placed = dict(self._set), self.placed
