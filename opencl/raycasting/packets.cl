@@ -12,10 +12,9 @@
 // -D SKIP_EMPTY=0, 1   pass by what the occupancy grid says is empty; the picture is the same
 #define LANES 16
 #define CROPPED 0
-#include "lib/lanes.cl"
+#include "lib/transpose.cl"
 typedef int Steps;
 typedef float Border;
-#include "lib/pixels.cl"
 #include "raycasting/ray.cl"
 #include "raycasting/stepping.cl"
 #include "raycasting/supersegments.cl"

@@ -19,7 +19,6 @@ typedef Real Border;
 #include "raycasting/first_supersegment.cl"
 #include "raycasting/ray.cl"
 #include "raycasting/stepping.cl"
-#include "lib/pixels.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Rays, and what stepping along them takes.

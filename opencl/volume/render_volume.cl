@@ -3,11 +3,34 @@
 //
 // -D CROPPED: see lib/cropping.cl; COMPENSATED: see lib/compositing.cl; the volume's: see
 // volume/march.cl
-#include "volume/cropped_march.cl"
-#include "volume/samples.cl"
+#include "volume/march.cl"
+#include "lib/cropping.cl"
 #include "lib/compositing.cl"
-#include "lib/pixels.cl"
 #pragma OPENCL FP_CONTRACT OFF
+
+// The kept parts of a ray, in t. `form`: the first of the planes of cropping.
+inline Kept kept_march(const March *march, __global const float *form, Real a, Real b, uint regions)
+{
+    Real at_t0[CROPPING_PLANES], at_t1[CROPPING_PLANES];
+    for (int k = 0; k < CROPPING_PLANES; ++k, form += FORM_SIZE) {
+        const Real value = march_value(march, form, a, b);
+        at_t0[k] = fma(march->t0, form_slope(form, a, b), value);
+        at_t1[k] = fma(march->t1, form_slope(form, a, b), value);
+    }
+    return kept_parts(at_t0, at_t1, march->t0, march->t1, regions);
+}
+
+// The share of a step that is kept.
+inline Real kept_share(const Kept *kept, Real front, Real back)
+{
+    Real sum = 0.0f;
+    for (int n = 0; n < MOST_KEPT; ++n) {
+        Real from = front, to = back;
+        cut_to_part(kept, n, &from, &to);
+        sum += fmax(to - from, 0.0f);
+    }
+    return sum / (back - front);
+}
 
 KERNEL_OF_LANES void render_volume(
     MEDIUM_PARAMETERS, const RaysOfView view, __global const float *forms,
@@ -16,7 +39,7 @@ KERNEL_OF_LANES void render_volume(
     float transmittance_cutoff,     // a ray ends where no more than this is left; negative: never
     float opacity_multiplier,       // of optical depths
     uint regions,                   // that cropping keeps; its planes are forms behind the others
-    __global const float4 *samples, // see volume/samples.cl; 0: steps are sampled here
+    __global const float4 *samples, // see volume/rays_of_view.cl; 0: steps are sampled here
     __global float4 *states, // of each ray behind a part of its steps: what has been seen; 0: all
                              // steps are taken
     __global float4 *image)  // premultiplied RGBA, top row first

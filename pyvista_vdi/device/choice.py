@@ -21,7 +21,6 @@ PROBE_RTOL = 4 * 2.0**-23
 
 _lock = threading.RLock()
 _probed: dict[str, tuple[DeviceInfo, Runtime | None]] = {}
-_default: Runtime | None = None
 
 
 def list_devices() -> list[DeviceInfo]:
@@ -52,7 +51,6 @@ def get_runtime(device: Any = None) -> Runtime:
     not usable; InvalidArgumentError for another type; MissingDependencyError without pyopencl;
     DeviceError in a fork of a process that had used or listed devices.
     """
-    global _default
     devices.require_drivers()
     if isinstance(device, Runtime):
         return device
@@ -60,16 +58,13 @@ def get_runtime(device: Any = None) -> Runtime:
     if device is None:
         device = os.environ.get(devices.DEVICE_VARIABLE, "").strip() or None
         origin = f"{devices.DEVICE_VARIABLE}="
-    if device is None and _default is not None:
-        return _default
     with _lock:
         infos = devices.find_devices()
         if device is None:
-            # The first that passes the probe, which is remembered: the drivers' list is fixed
+            # The first that passes the probe
             for info in sorted(infos, key=devices.preference):
-                _default = _probe(info)[1]
-                if _default is not None:
-                    return _default
+                if (runtime := _probe(info)[1]) is not None:
+                    return runtime
             found = devices.listing([_probe(info)[0] for info in infos])
             raise NoDeviceError(
                 f"no usable OpenCL device: there is {found}. Remedy: {devices.REMEDY}"

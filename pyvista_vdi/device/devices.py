@@ -25,8 +25,7 @@ DEVICE_VARIABLE = "PYVISTA_VDI_DEVICE"
 REMEDY = (
     'install a CPU runtime with  pip install "pyvista-vdi[cpu]"  (x86-64 Linux and Windows), or '
     "Debian's and Ubuntu's package pocl-opencl-icd, or your GPU's OpenCL driver; if that is "
-    "installed, unset OCL_ICD_VENDORS and OCL_ICD_FILENAMES, and use a device of pyvista_vdi "
-    "before  import pyopencl"
+    "installed, unset OCL_ICD_VENDORS, and use a device of pyvista_vdi before  import pyopencl"
 )
 
 
@@ -116,15 +115,10 @@ def select(infos: Sequence[DeviceInfo], selector: str, origin: str) -> DeviceInf
     found = next((found for way in ways if (found := [i for i in infos if way(i)])), [])
     if len(found) == 1:
         return found[0]
+    means = f"there is no such OpenCL device; there is {listing(infos)}"
     if found:
-        raise NoDeviceError(
-            f"{origin}{selector!r} means {len(found)} devices: {listing(found)}; "
-            "name one of them by its selector"
-        )
-    raise NoDeviceError(
-        f"{origin}{selector!r}: there is no such OpenCL device; there is {listing(infos)}"
-        f"{'' if infos else f'; {REMEDY}'}"
-    )
+        means = f"it means {len(found)} devices, {listing(found)}: name one of them by its selector"
+    raise NoDeviceError(f"{origin}{selector!r}: {means}{'' if infos else f'; {REMEDY}'}")
 
 
 def listing(infos: Sequence[DeviceInfo]) -> str:
@@ -247,36 +241,16 @@ def _describe(cl: ModuleType, device: Any, platform_index: int, device_index: in
     )
 
 
-#: Set by a user who has decided which drivers are seen: then nothing is changed.
-USER_VARIABLES = ("OCL_ICD_VENDORS", "OCL_ICD_FILENAMES")
-
-INTEL_DISTRIBUTION, INTEL_LIBRARY = "intel-opencl-rt", "libintelocl.so"
+INTEL_LIBRARY = "libintelocl.so"
 
 
 def intel_library() -> Path | None:
     """Return the absolute path of pip's Intel CPU runtime, or None."""
-    candidates = [Path(sys.prefix) / "lib" / INTEL_LIBRARY]
     with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-        files = importlib.metadata.distribution(INTEL_DISTRIBUTION).files or []
-        candidates[:0] = [Path(str(f.locate())) for f in files if f.name == INTEL_LIBRARY]
-    return next((path.resolve() for path in candidates if path.resolve().is_file()), None)
-
-
-def libraries_with(added: Path) -> list[str]:
-    """Return the libraries that vendor files name, each once, and one more.
-
-    A bare library name is left to the dynamic linker; a path that does not exist is dropped.
-    """
-    found: list[str] = []
-    for folder in ("/etc/OpenCL/vendors", Path(sys.prefix, "etc", "OpenCL", "vendors")):
-        for file in sorted(Path(folder).glob("*.icd")):
-            with contextlib.suppress(OSError):  # unreadable for us, hence for the loader as well
-                library = file.read_text(encoding="utf-8", errors="surrogateescape").strip()
-                if library and (os.sep not in library or Path(library).is_file()):
-                    found.append(library)
-    if not any(Path(library).name.startswith(INTEL_LIBRARY) for library in found):
-        found.append(str(added))
-    return list(dict.fromkeys(found))
+        files = importlib.metadata.files("intel-opencl-rt") or []
+        paths = [Path(str(each.locate())).resolve() for each in files if each.name == INTEL_LIBRARY]
+        return next((path for path in paths if path.is_file()), None)
+    return None
 
 
 @contextlib.contextmanager
@@ -288,21 +262,30 @@ def drivers_visible() -> Iterator[None]:
     finds its library. That of pyopencl's Linux wheels reads the folder ``OCL_ICD_VENDORS`` in place
     of ``/etc/OpenCL/vendors``: here a temporary one, with the system's vendor files and one more.
     """
-    library, variables = intel_library(), {}
-    with contextlib.ExitStack() as stack:
-        if library and sys.platform == "linux" and not any(map(os.environ.get, USER_VARIABLES)):
-            with contextlib.suppress(OSError):  # no folder for temporary files
-                # mkdtemp creates with mode 0700: nobody else can slip a library in.
-                folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="pyvista-vdi-icd-"))
-                for number, each in enumerate(libraries_with(library)):
-                    Path(folder, f"{number:02d}.icd").write_bytes(os.fsencode(each + "\n"))
-                variables["OCL_ICD_VENDORS"] = folder
-        os.environ.update(variables)
+    library = intel_library()
+    # Who has set the variable has decided which drivers are seen
+    if library is None or sys.platform != "linux" or os.environ.get("OCL_ICD_VENDORS"):
+        yield
+        return
+    # Read the vendor files. A bare name is left to the dynamic linker; a path must lead somewhere
+    found: list[str] = []
+    for place in ("/etc/OpenCL/vendors", Path(sys.prefix, "etc", "OpenCL", "vendors")):
+        for file in sorted(Path(place).glob("*.icd")):
+            with contextlib.suppress(OSError):  # unreadable for us, hence for the loader as well
+                each = file.read_text(encoding="utf-8", errors="surrogateescape").strip()
+                if each and (os.sep not in each or Path(each).is_file()):
+                    found.append(each)
+    if not any(Path(each).name.startswith(INTEL_LIBRARY) for each in found):
+        found.append(str(library))
+    # The folder has mode 0700: nobody else can slip a library in
+    with tempfile.TemporaryDirectory(prefix="pyvista-vdi-icd-") as folder:
+        for number, each in enumerate(dict.fromkeys(found)):
+            Path(folder, f"{number:02d}.icd").write_bytes(os.fsencode(each + "\n"))
+        os.environ["OCL_ICD_VENDORS"] = folder
         try:
             yield
         finally:
-            for name in variables:
-                os.environ.pop(name, None)
+            os.environ.pop("OCL_ICD_VENDORS", None)
 
 
 @contextlib.contextmanager

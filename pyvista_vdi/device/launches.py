@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.device import programs
+from pyvista_vdi.device.constants import literal
 from pyvista_vdi.device.devices import DeviceInfo
 from pyvista_vdi.device.memory import DeviceBuffer, Memory
 from pyvista_vdi.device.programs import Define, Kernel
@@ -83,12 +84,8 @@ class Launch:
 
         It returns at once; inside :meth:`Runtime.background`, when all is done, in pieces. ``size``
         is the work-items in each dimension, of which none are launched if one is 0; ``group`` those
-        of a work-group, which divide them (see :func:`padded`); arguments are as of
-        :meth:`Runtime.bind`.
-
-        Raises InvalidArgumentError or TypeError if the arguments are not the kernel's,
-        DeviceMemoryError or DeviceError if the driver refuses, sizes that do not fit each other for
-        one, or a buffer has been released.
+        of a work-group, which divide them (see :func:`padded`). Raises what :meth:`Runtime.bind`
+        does, and DeviceMemoryError or DeviceError if the driver refuses.
         """
         # Set what changes
         device, kernel = self._device, self._kernel
@@ -191,7 +188,8 @@ class Runtime(Memory):
         Threads may share it. KernelBuildError if it cannot be compiled. Background work compiles
         beside frames: that takes seconds, and not the device.
         """
-        options, source = (*self._options, *programs.define_options(defines)), programs.expand(path)
+        given = [f"-D{name}={literal(value)}" for name, value in sorted(defines.items())]
+        options, source = (*self._options, *given), programs.expand(path)
         program, key = (source, options), (source, name, options)
         if key in self._kernels:
             return self._kernels[key]

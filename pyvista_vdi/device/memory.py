@@ -20,6 +20,8 @@ from pyvista_vdi.model.host_memory import aligned_empty
 PINNED_BYTES, LEAST_PINNED = 256 * 2**20, 2**20
 #: Bytes of the largest buffers whose memory is kept for the next ones, and of all that is kept.
 MOST_POOLED, MOST_KEPT = 64 * 2**20, 256 * 2**20
+#: Bytes of the smallest array that is read in place: a smaller one is aligned by chance.
+LEAST_IN_PLACE = 2**16
 #: Bytes that background work copies at a time: about a millisecond at a host memory's pace.
 COPY_BYTES = 4 * 2**20
 
@@ -209,14 +211,14 @@ class Memory(Turns):
     ) -> DeviceBuffer:
         """Return an array's values on the device, for kernels to read; ``name`` says of what.
 
-        A CPU device uses an array that is C-contiguous and aligned for it in place (see
+        A CPU device uses a large array that is C-contiguous and aligned for it in place (see
         :func:`aligned_empty`): do not change the array before the buffer is released. Otherwise
         the values are copied. ``brief``: for launches that are enqueued now, and released behind
         them. Nothing waits then; do not change the array before their results are downloaded.
         Raises as :meth:`buffer` does.
         """
         array, flags = np.ascontiguousarray(array), self.cl.mem_flags
-        if self.in_place(array):
+        if array.nbytes >= LEAST_IN_PLACE and self.in_place(array):
             access = flags.READ_ONLY | flags.USE_HOST_PTR
             return self._take(access, array.shape, array.dtype, name, array)
         with kept_together() as keep:

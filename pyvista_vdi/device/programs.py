@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyvista_vdi.device.constants import definitions, literal
+from pyvista_vdi.device.constants import definitions
 from pyvista_vdi.device.devices import opencl
 from pyvista_vdi.errors import KernelBuildError
 from pyvista_vdi.model.user_cache import user_cache
@@ -101,13 +101,30 @@ def parameters_of(
                 fields |= {each: inner[each] for each in inner.names}
             else:
                 fields |= {each: _dtype(kind, known) for each in names}
-        if not any(kind is None for kind in fields.values()):
-            known[structure] = _laid_out(fields)
+        if any(kind is None for kind in fields.values()):
+            continue
+        # Laid out as in OpenCL C: each field aligned to its size
+        offsets, end, sizes = [], 0, [kind.itemsize for kind in fields.values() if kind]
+        for size in sizes:
+            offsets.append(-(-end // size) * size)
+            end = offsets[-1] + size
+        layout: Any = {"names": list(fields), "formats": list(fields.values())}
+        layout |= {"offsets": offsets, "itemsize": -(-end // max(sizes)) * max(sizes)}
+        known[structure] = np.dtype(layout)
+    # Read the arguments; what is the same in several kernels is a macro
+    written = re.search(rf"(?:__kernel|KERNEL_OF_LANES)\s+void\s+{name}\s*\(([^)]*)\)", source)
+    if written is None:
+        return {}  # the compiler will say so
+    text = written[1]
+    for macro, expanded in _PARAMETERS.findall(source):
+        text = re.sub(rf"\b{macro}\b", lambda _, to=expanded: to.replace("\\", " "), text)
     found: dict[str, Parameter] = {}
-    for argument, declared in written_arguments(source, name).items():
-        element = declared.removeprefix("local ").removesuffix("*")
+    for each in text.replace("*", " * ").split(","):
+        words = each.split()
+        element = next(word for word in words if word not in _QUALIFIERS)
+        declared = "local " * ("__local" in words) + element + "*" * ("*" in words)
         dtype = _dtype(str(defines.get(element, element)), known)
-        found[argument] = Parameter(len(found), declared, dtype)
+        found[words[-1]] = Parameter(len(found), declared, dtype)
     return found
 
 
@@ -118,39 +135,9 @@ def _dtype(kind: str, known: Mapping[str, np.dtype[Any]]) -> np.dtype[Any] | Non
     return number if number is None or count == 1 else np.dtype((number, (count,)))
 
 
-def _laid_out(fields: Mapping[str, Any]) -> np.dtype[Any]:
-    """Return the type of a structure, laid out as in OpenCL C: each field aligned to its size."""
-    offsets, end, sizes = [], 0, [kind.itemsize for kind in fields.values()]
-    for size in sizes:
-        offsets.append(-(-end // size) * size)
-        end = offsets[-1] + size
-    layout: Any = {"names": list(fields), "formats": list(fields.values()), "offsets": offsets}
-    layout["itemsize"] = -(-end // max(sizes)) * max(sizes)
-    return np.dtype(layout)
-
-
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _STRUCTURE = re.compile(r"typedef struct\s*\{([^}]*)\}\s*(\w+);")
 _PARAMETERS = re.compile(r"#define (\w+_PARAMETERS)((?:[^\n]*\\\n)*[^\n]*)")
-
-
-def written_arguments(source: str, name: str) -> dict[str, str]:
-    """Return a kernel's arguments as OpenCL C has them: types by name, ``"local ulong*"``, say.
-
-    What is the same in several kernels is a macro whose name ends in ``_PARAMETERS``.
-    """
-    found = re.search(rf"(?:__kernel|KERNEL_OF_LANES)\s+void\s+{name}\s*\(([^)]*)\)", source)
-    if found is None:
-        return {}  # the compiler will say so
-    written = found[1]
-    for macro, expanded in _PARAMETERS.findall(source):
-        written = re.sub(rf"\b{macro}\b", lambda _, to=expanded: to.replace("\\", " "), written)
-    arguments = {}
-    for each in written.replace("*", " * ").split(","):
-        words = each.split()
-        kind = next(word for word in words if word not in _QUALIFIERS)
-        arguments[words[-1]] = "local " * ("__local" in words) + kind + "*" * ("*" in words)
-    return arguments
 
 
 _QUALIFIERS = {"__global", "__local", "__constant", "const", "volatile", "restrict"}
@@ -164,11 +151,6 @@ def read_resource(path: str) -> str:
     return files("pyvista_vdi.opencl").joinpath(path).read_text(encoding="utf-8")
 
 
-@cache
-def _expanded(path: str) -> str:
-    return _with_includes(path, read_resource(path))
-
-
 def expand(path: str | Path) -> str:
     """Return a kernel file's text with its includes, and the constants that it may use, in place.
 
@@ -177,11 +159,12 @@ def expand(path: str | Path) -> str:
     file on disk (tests and users' own kernels), whose includes are taken from there.
     """
     if isinstance(path, str):
-        return _expanded(path)
+        return _with_includes(path)
     return _with_includes(path.name, path.read_text(encoding="utf-8"))
 
 
-def _with_includes(name: str, text: str) -> str:
+@cache
+def _with_includes(name: str, text: str | None = None) -> str:
     lines: list[str] = []
     seen = {name}
 
@@ -198,17 +181,12 @@ def _with_includes(name: str, text: str) -> str:
                 append(found[1], read_resource(found[1]))
             lines.append(f'#line {number + 1} "{name}"')
 
-    append(name, text)
+    append(name, read_resource(name) if text is None else text)
     return "\n".join([*definitions(), *lines]) + "\n"
 
 
 _logger = logging.getLogger(__name__)
 _kernel_lock = threading.RLock()
-
-
-def define_options(defines: Mapping[str, Define]) -> tuple[str, ...]:
-    """Return ``-D`` options in sorted order."""
-    return tuple(f"-D{name}={literal(value)}" for name, value in sorted(defines.items()))
 
 
 class Kernel:
@@ -244,8 +222,14 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
     cl: Any = opencl()
     joined = " ".join(options)
     call = {"options": joined.encode(), "devices": [device]}
-    kept = import_module("pyopencl.characterize").has_src_build_cache(device)  # by the driver
-    place = None if kept else _place(device, joined, source)
+    # Find its file in the cache, unless the driver has one
+    place, folder = None, user_cache()
+    kept = import_module("pyopencl.characterize").has_src_build_cache(device)
+    if folder is not None and not kept and os.environ.get("PYOPENCL_NO_CACHE") != "1":
+        names = ("vendor", "name", "version")
+        driver = [getattr(each, name) for each in (device.platform, device) for name in names]
+        key = repr((driver, device.driver_version, joined, source))
+        place = folder / "programs" / hashlib.sha256(key.encode()).hexdigest()
     with contextlib.suppress(cl.Error, OSError):  # made for another processor of that name
         if place is not None and place.exists():
             program = cl._cl._Program(context, [device], [place.read_bytes()])
@@ -277,17 +261,6 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
             finally:
                 new.unlink(missing_ok=True)
     return cl.Program(program)
-
-
-def _place(device: Any, options: str, source: str) -> Path | None:
-    """Return the file of a compiled program in the cache; None where there is none."""
-    if os.environ.get("PYOPENCL_NO_CACHE", "").lower() in ("1", "true", "yes", "on"):
-        return None
-    folder = user_cache()
-    names = ("vendor", "name", "version")
-    driver = [getattr(each, name) for each in (device.platform, device) for name in names]
-    key = repr((driver, device.driver_version, options, source))
-    return folder and folder / "programs" / hashlib.sha256(key.encode()).hexdigest()
 
 
 def _log(program: Any, device: Any) -> str:

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model import types
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera, check_window_size
@@ -164,15 +164,6 @@ class Options:
     def checked(cls: type[_Record], *given: Any, **named: Any) -> _Record:
         """Return a record of what a user gave, whatever its types are."""
         return cls(*given, **named)
-
-    @classmethod
-    def of(cls: type[_Record], options: _Record | None, changes: Mapping[str, Any]) -> _Record:
-        """Return options with some of them changed, or the defaults; TypeError if one is none."""
-        if options is None:
-            return cls(**changes)
-        if not isinstance(options, cls):
-            raise InvalidArgumentTypeError(f"options must be {cls.__name__}; got {options!r}")
-        return replace(options, **changes) if changes else options
 
     @property
     def given(self) -> dict[str, Any]:
@@ -397,11 +388,6 @@ class QualityTarget(Options):
                 "pictures are to be: give one of them"
             )
         super().__post_init__()
-        if self.quality == "reference" and (self.full_fps, self.max_bytes) != (None, None):
-            raise InvalidArgumentError(
-                "quality='reference' is what is made without a dial, so that full_fps and "
-                "max_bytes have nothing to choose: leave them out, or ask for 'high'"
-            )
 
     @property
     def ssim(self) -> float | None:

@@ -18,11 +18,13 @@ DTYPES = ["u1", "i2", "f8"]
 @pytest.mark.parametrize("aligned", [True, False])
 def test_upload_and_download(runtime, aligned):
     """Aligned arrays are used in place on a CPU."""
-    values = np.random.default_rng(7).integers(0, 120, (5, 3, 4))
+    values = np.random.default_rng(7).integers(0, 120, (50, 30, 64))
     gc.collect()
     before = runtime.allocated
     for dtype in DTYPES:
-        array = aligned_empty((5, 3, 4), dtype) if aligned else np.empty((5, 3, 4), dtype)[::-1]
+        array = (
+            aligned_empty((50, 30, 64), dtype) if aligned else np.empty((50, 30, 64), dtype)[::-1]
+        )
         assert array.ctypes.data % 4096 == 0 or not aligned
         array[...] = values
         with runtime.upload(array, name="values") as buffer:
@@ -30,7 +32,7 @@ def test_upload_and_download(runtime, aligned):
                 assert runtime.allocated - before == (0 if runtime.is_cpu else array.nbytes)
             del array
             back = runtime.download(buffer)
-            assert (back.dtype, back.shape) == (np.dtype(dtype), (5, 3, 4))
+            assert (back.dtype, back.shape) == (np.dtype(dtype), (50, 30, 64))
             np.testing.assert_array_equal(back, values)
             np.testing.assert_array_equal(
                 runtime.download(buffer, np.empty(7, dtype)), values.ravel()[:7]

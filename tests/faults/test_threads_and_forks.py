@@ -85,7 +85,7 @@ runtime = get_runtime(sys.argv[1])
 volume = fresh_volume()
 vdi = generate_vdi(volume, CAMERA, WINDOW, TRANSFER, device=runtime)
 image = render_vdi(vdi, CAMERA, device=runtime)
-in_place = runtime.upload(aligned_empty((64, 64), np.float32))
+in_place = runtime.upload(aligned_empty((256, 256), np.float32))
 
 def child():
     said = []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from pyvista_vdi.generation import generate
 from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, MediumOptions
@@ -20,7 +22,7 @@ def request(
     metadata=None, **changes
 ):  # fmt: skip
     """The request of a VDI."""
-    made = GenerationOptions.of(options, changes)
+    made = replace(options or GenerationOptions(), **changes)
     return GenerationRequest(
         volume, transfer_function, camera, window_size, made, device, progress, metadata or {}
     )

@@ -89,7 +89,7 @@ class VolumePicture:
             return raycast_volume(
                 made.volume, made.transfer_function, frame.replace(device=made.device), made.options
             )
-        return raycast_medium(self._medium, frame, lit_from=lit_from or self.request.generating[0])
+        return raycast_medium(self._medium, frame, lit_from=lit_from or self.request.camera)
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,6 +128,16 @@ class VDIMapperMethods:
         """Return the device as it was set."""
         return self.driver.device
 
+    # VTK's own switch would draw its volume into a smaller framebuffer
+
+    def AutoAdjustSampleDistancesOn(self: Any) -> None:
+        """Draw previews."""
+        self.SetAutoAdjustSampleDistances(True)
+
+    def AutoAdjustSampleDistancesOff(self: Any) -> None:
+        """Draw every frame in full."""
+        self.SetAutoAdjustSampleDistances(False)
+
     def ShallowCopy(self: Any, other: Any) -> None:
         """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.
 

@@ -8,14 +8,20 @@ from __future__ import annotations
 import logging
 import math
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.errors import Cancelled, InvalidVolumeError, VDIError
+from pyvista_vdi.errors import (
+    Cancelled,
+    InvalidVolumeError,
+    VDIError,
+    VDIWarning,
+    warn_external,
+)
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.render_options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
@@ -35,7 +41,6 @@ from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, size_of
-from pyvista_vdi.vtk_pipeline.interaction.status import Warnings
 from pyvista_vdi.vtk_pipeline.interaction.window import now
 
 _log = logging.getLogger(__name__)
@@ -61,7 +66,7 @@ class Planner:
         self.settings = MapperSettings()
         self.device: Any = None
         self.input: Input | None = None
-        self.warnings = Warnings()
+        self.said: set[Hashable] = set()  # warnings, or their causes
         self.failed: tuple[Any, ...] = ()  # stamps at which a VDI could not be made
         self.worker = BackgroundThread("pyvista-vdi generation")
         # The thread knows the worker alone, so that this can be collected while it works
@@ -153,9 +158,9 @@ class Planner:
         if self.settings.regenerate == "auto":
             cone = vdi.metadata.get("view_cone")
             cone = cone if isinstance(cone, int | float) else _VIEW_CONE
-            for cause, message in lacking(self._as_made(vdi, frame), cone, source.remedy):
+            for cause, message in lacking(self._as_made(vdi, frame), cone):
                 # Once for all VDIs of one view, such as the steps of a series
-                self.warnings.warn(message, cause=(cause, (vdi.camera, vdi.window_size)))
+                self.warn(message, cause=(cause, (vdi.camera, vdi.window_size)))
         parts = source.parts()
         blended = len(parts) > 1 and parts[0][0] is vdi
         full = not frame.window.previews(self.settings)
@@ -266,7 +271,7 @@ class Planner:
                 for_view = not (seen.stale or seen.chosen)
                 self.making = Making(request.content, planned.make, for_view)
                 self._asked = request
-                self.worker.put(vdi_job(request.generation, request.target))
+                self.worker.put(vdi_job(request, request.target))
         if planned.estimate:
             self._estimate(source, seen.view)
         if planned.update:
@@ -340,12 +345,23 @@ class Planner:
 
     def _complain(self, error: BaseException) -> None:
         """Say once that a VDI cannot be made."""
-        said = None if self.input is None else self.input.complaint(error)
-        usual = (
-            f"the VDI cannot be made anew: {type(error).__name__}: {error}; what was shown stays, "
-            "and actor.regenerate() tries again"
-        )
-        self.warnings.warn(said or usual, error)
+        said = f"another VDI cannot be made: {type(error).__name__}: {error}; what was shown stays"
+        self.warn(f"{said}, and actor.regenerate() tries again", error)
+
+    def warn(
+        self, message: str, error: BaseException | None = None, cause: Hashable = None
+    ) -> None:
+        """Say a thing once: exceptions cannot pass through VTK's renderer. It is in the log, too.
+
+        What has the same ``cause`` was said before.
+        """
+        _log.debug("%s", message, exc_info=error)
+        if (cause or message) not in self.said:
+            self.said.add(cause or message)
+            try:
+                warn_external(message)
+            except VDIWarning:  # warnings are errors: the log is what is left
+                _log.error(message)
 
     # Between frames
 
@@ -408,7 +424,7 @@ class Planner:
                 if source.stamp() not in self.failed:
                     self._update(source)
         elif seen is not None:
-            return source.of_view(source.view_for(*seen))
+            return source.source.UpdateFromInput(source.view_for(*seen))
         return source.last()
 
     def vdi_to_pick(self, frame: Frame) -> VDI | None:

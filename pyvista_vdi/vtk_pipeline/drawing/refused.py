@@ -27,10 +27,6 @@ OF_MAPPERS: Mapping[str, tuple[str, ...]] = {
         *("SetScalarMode", "SetScalarModeToUsePointFieldData", "SetScalarModeToUseCellData"),
         *("SetScalarModeToUseCellFieldData", "SelectScalarArray", "SetArrayName", "SetArrayId"),
     ),
-    "VTK's own switch would draw its volume into a smaller framebuffer: use "
-    "SetAutoAdjustSampleDistances": (
-        *("AutoAdjustSampleDistancesOn", "AutoAdjustSampleDistancesOff"),
-    ),
     "a VDIMapper draws one VDI: give each its own VDIMapper and VDIActor": ("AddInputConnection",),
 }
 

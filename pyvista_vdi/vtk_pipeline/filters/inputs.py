@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -43,8 +42,6 @@ class Input:
     prop: Any = None
     #: The port of what the bounds depend on; ``None`` where they depend on nothing.
     port: Any = None
-    #: What remedies a view that the VDI does not serve, where there is no source.
-    remedy = "without its volume it cannot be made anew"
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
     period: int | None = None
     #: Whether one step of a series is shown after the other: the event loop has to look at that.
@@ -116,10 +113,6 @@ class Input:
 
         ``None`` where nothing goes on by itself.
         """
-        return None
-
-    def complaint(self, error: BaseException) -> str | None:
-        """Return what is said of an error between two frames; ``None``: what is usual."""
         return None
 
     def parts(self) -> list[tuple[VDI, float]]:
@@ -247,29 +240,17 @@ class SourceInput(Input):
             given = given.replace(model_transform=model_transform)
         return View(given, self.source.GetWindowSize() or size)
 
-    def of_view(self, view: View) -> VDI:
-        """Return the VDI of a view and of what there is now, made if it is another one.
-
-        The view of those to come stays.
-        """
-        source, wanted = self.source, self.source.MakeRequest(view)
-        made = source.GetCurrentRequest()
-        if made is None or made.key != wanted.key:
-            source.TakeVDI(source.MakeVDI(wanted), wanted, view=False)
-        return source.GetCurrentVDI()  # type: ignore[return-value]
-
     def exact_request(self, view: View) -> Request:
         """Return what a VDI of exactly a view's picture is made of.
 
         What covers all of a volume that is near would have larger lists than that has pixels.
         """
         wanted = self.source.MakeRequest(view)
-        camera, size = view.camera, view.size
-        generating, lists = wanted.generating
-        extents = zip(generating.half_extent(lists), camera.half_extent(size), strict=True)
+        camera, size, lists = view.camera, view.size, wanted.window_size
+        extents = zip(wanted.camera.half_extent(lists), camera.half_extent(size), strict=True)
         pixels = math.prod(size) * math.prod(high / low for high, low in extents)
         if pixels > math.prod(lists) * (1 + ROUNDING):
-            wanted = replace(wanted, generating=(camera, size))
+            wanted = wanted.seen_from(camera, size)
         return wanted
 
     def take_camera(self, camera: Any, model_transform: NDArray[np.float64]) -> None:
