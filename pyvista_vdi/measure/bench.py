@@ -21,8 +21,12 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_whole
 from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.model.options import (
+    FrameRequest,
+    GenerationOptions,
+    GenerationRequest,
+    RenderOptions,
+)
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
