@@ -176,7 +176,7 @@ def render_depth(
     seen = _seen(shown, view)
     usual = getattr(shown, "picture_size", seen.picture_size)
     size: Any = usual if window_size is None else window_size
-    request = FrameRequest(view, size, options.drawn(), opaque_depth, device)
+    request = FrameRequest(view, size, RenderOptions(**vars(options)), opaque_depth, device)
     from pyvista_vdi.raycasting.raycast import render_first_hits
 
     return render_first_hits(seen, request, FirstHit.of(opacity_threshold, accumulated))
@@ -247,7 +247,7 @@ def pick(
     size: Any = usual if window_size is None else window_size
     from pyvista_vdi.raycasting.picking import pick_vdi
 
-    request = FrameRequest(view, size, options.drawn(), opaque_depth)
+    request = FrameRequest(view, size, RenderOptions(**vars(options)), opaque_depth)
     return pick_vdi(seen, request, pixel, FirstHit.of(opacity_threshold, accumulated), kept)
 
 
@@ -300,7 +300,7 @@ def render_volume(
         If there is no device, or it fails.
     """
     view, read = Camera.from_any(camera), as_volume(volume, look.scalars, look.preference)
-    drawn = options.drawn()
+    drawn = RenderOptions(**vars(options))
     if not as_flag(early_termination, "early_termination"):
         drawn = drawn.replace(transmittance_cutoff=0.0)
     table = look.transfer_function_of(read)

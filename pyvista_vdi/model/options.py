@@ -483,10 +483,6 @@ class SceneOptions(Options):
         check=Number("a finite factor of the extinction, 0 (transparent) or above"),
     )
 
-    def drawn(self) -> RenderOptions:
-        """Return how it is drawn where nothing else is said."""
-        return RenderOptions(**{name: getattr(self, name) for name in self.declared})
-
 
 @record
 @dataclass(frozen=True)
