@@ -15,8 +15,8 @@ from pyvista_vdi.device import DeviceBuffer
 from pyvista_vdi.device.constants import BUNDLE, PLANE_FORMS
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.options import FrameRequest, RenderOptions
 from pyvista_vdi.model.ray_forms import Rectangle
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.raycasting.packets import LANES, Packets, packets_of
 from pyvista_vdi.raycasting.picking import FirstHit
 from pyvista_vdi.raycasting.prepared import PreparedVDI

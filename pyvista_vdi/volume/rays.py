@@ -16,8 +16,8 @@ from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.float32_limits import ENTRY_PER_POINT, FAR_ENTRY, MOST_STEPS, NEAR_ENTRY
+from pyvista_vdi.model.options import Planes
 from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed
-from pyvista_vdi.model.render_options import Planes
 from pyvista_vdi.model.volume import Grid
 
 Ends = tuple[float, float, float]
