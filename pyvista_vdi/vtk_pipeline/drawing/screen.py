@@ -92,25 +92,49 @@ _VIEWPORT = "vdiViewport"
 #: matrices, per pixel. Window and level, and selections, are as in VTK's.
 #: A sampler takes the number of its texture unit, and VTK knows of no custom uniform of that kind:
 #: it sets an integer, and declares it, which is no declaration of the sampler under another name.
+#: VTK calls the three functions. Where volumes are peeled it has rays cast between two layers of
+#: translucent geometry, again and again: the picture cannot be taken apart, and is given whole to
+#: what begins at the near plane, and so lies before all that is translucent, as without peeling.
 _LOOKUP = f"""//VTK::System::Dec
 //VTK::Output::Dec
 in vec3 ip_textureCoords;
 in vec3 ip_vertexPos;
-vec4 g_fragColor;
+vec4 g_fragColor = vec4(0.0);
 uniform sampler2D vdiImage;
 uniform float in_scale;
 uniform float in_bias;
 //VTK::Picking::Dec
+//VTK::DepthPeeling::Dec
 #define vdiImage vdiImageUnit
 //VTK::CustomUniforms::Dec
 #undef vdiImage
 
-void main()
+// What VTK's calls name, for rays of its own
+uniform vec2 in_inverseWindowSize;
+const float g_opacityThreshold = 1.0;
+mat4 g_texToView, in_projectionMatrix, in_modelViewMatrix;
+mat4 in_volumeMatrix[1], in_textureDatasetMatrix[1];
+
+void initializeRayCast() {{}}
+
+vec4 castRay(const float zStart, const float zEnd)
 {{
+  if (zStart > 0.0)
+    return vec4(0.0);
   g_fragColor = texture(vdiImage, (gl_FragCoord.xy - {_VIEWPORT}.xy) * {_VIEWPORT}.zw);
+  return g_fragColor;
+}}
+
+void finalizeRayCast()
+{{
   //VTK::Picking::Exit
   g_fragColor.rgb = g_fragColor.rgb * in_scale + in_bias * g_fragColor.a;
   gl_FragData[0] = g_fragColor;
+}}
+
+void main()
+{{
+  //VTK::CallWorker::Impl
 }}
 """
 
