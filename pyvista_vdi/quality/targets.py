@@ -22,9 +22,13 @@ from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, warn_exte
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import SSIM_WINDOW
-from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, QualityTarget
+from pyvista_vdi.model.options import (
+    FrameRequest,
+    GenerationOptions,
+    GenerationRequest,
+    QualityTarget,
+)
 from pyvista_vdi.model.packing import Precision
-from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.types import ClientLike
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import ViewErrorEstimator, world_centre
