@@ -16,7 +16,7 @@ import numpy as np
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidVolumeError, VDIError
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.model.view import coverage
 from pyvista_vdi.quality.plan import SETTLED
 from pyvista_vdi.quality.rate import FLOOR, reduced

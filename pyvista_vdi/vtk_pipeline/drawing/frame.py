@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.render_options import RenderOptions
+from pyvista_vdi.model.options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.quality.costs import RenderMode

@@ -23,7 +23,7 @@ from pyvista_vdi.errors import (
     warn_external,
 )
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.render_options import RenderOptions
+from pyvista_vdi.model.options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View, coverage
 from pyvista_vdi.quality.background import BackgroundThread, Job, vdi_job

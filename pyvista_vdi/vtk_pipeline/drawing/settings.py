@@ -8,8 +8,13 @@ from functools import partial
 from typing import Any
 
 from pyvista_vdi.model.checks import Number, as_flag
-from pyvista_vdi.model.options import Option, declared
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, DrawingOptions, RenderOptions
+from pyvista_vdi.model.options import (
+    TRANSMITTANCE_CUTOFF,
+    DrawingOptions,
+    Option,
+    RenderOptions,
+    declared,
+)
 from pyvista_vdi.model.types import Draw, Policy
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, checked_opacity
 
