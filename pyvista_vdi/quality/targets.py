@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.device import get_runtime
@@ -294,7 +294,7 @@ def turned(camera: Camera, bounds: Sequence[float], degrees: float) -> Camera:
     axis = np.asarray(camera.view_up) / np.linalg.norm(camera.view_up)
     cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
 
-    def around(point: Sequence[float]) -> NDArray[np.float64]:  # Rodrigues' formula
+    def around(point: ArrayLike) -> NDArray[np.float64]:  # Rodrigues' formula
         v = np.asarray(point) - centre
         along = axis * (axis @ v)
         return np.asarray(centre + along + (v - along) * cosine + np.cross(axis, v) * sine)

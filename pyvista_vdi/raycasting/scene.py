@@ -213,13 +213,15 @@ class Scene:
         """Return the arguments that every kernel takes which draws a frame."""
         prepared, cutoff = self.prepared, self.options.transmittance_cutoff
         occupancy = prepared.occupancy
+        skips = self.options.skip_empty and occupancy.worthwhile
+        looks = skips or self.options.preview_samples is not None
         return {
             "headers": prepared.headers,
             "faces": prepared.faces,
             "media": prepared.media,
             "forms": forms,
             "opaque_depth": ends,
-            "masks": occupancy.masks,
+            "masks": occupancy.masks if looks else None,
             "frame": {
                 "lists_wide": prepared.window[0],
                 "lists_high": prepared.window[1],
@@ -233,5 +235,6 @@ class Scene:
                 "depth_step": prepared.depth_step,
                 "nearest_offset": prepared.nearest - prepared.depth_origin,
                 "regions": self.cropped.regions,
+                "one_list": self.one_list,
             },
         }

@@ -137,10 +137,10 @@ class Variant:
     scalar, or colours and a scalar (1 or 4 ``components``); whether the ``nearest`` point is
     sampled, and the medium of its scalar looked up (``by_scalar``). Samples are not lit, lit, or
     lit by one headlight and nothing else (``shaded`` 0, 1, 2); opacity may depend on the gradient;
-    voxels may be ``part`` of a grid; what cropping keeps may be no box (``cropped``). With
-    ``double_float``, rays enter the volume so far from where they are formed that float32 does not
-    hold it. ``compensated``: how sums along a ray are kept (``lib/compositing.cl``). ``sharp``, no
-    ``-D`` option: a specular power is so large that cosines round it off.
+    voxels may be ``part`` of a grid. With ``double_float``, rays enter the volume so far from where
+    they are formed that float32 does not hold it. ``compensated``: how sums along a ray are kept
+    (``lib/compositing.cl``). ``sharp``, no ``-D`` option: a specular power is so large that cosines
+    round it off.
     """
 
     voxel: str = "uchar"
@@ -153,7 +153,6 @@ class Variant:
     part: bool = False
     double_float: bool = False
     compensated: int = 0
-    cropped: bool = False
     sharp: bool = False
 
     @cached_property
@@ -170,7 +169,6 @@ class Variant:
             "GRID_PART": self.part,
             "DOUBLE_FLOAT_RAYS": self.double_float,
             "COMPENSATED": self.compensated,
-            "CROPPED": self.cropped,
         }
 
     @property

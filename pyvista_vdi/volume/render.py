@@ -45,9 +45,7 @@ class ClippedRays:
         self.planes = march.planes + len(cropped.planes)
         self.forms = march.packed(*cropped.planes, *cropped.forms)
         self.regions = cropped.regions
-        self.variant = replace(
-            medium.variant, double_float=march.double_float, cropped=bool(cropped.forms)
-        )
+        self.variant = replace(medium.variant, double_float=march.double_float)
 
     def uploaded(
         self, runtime: Runtime, stack: ExitStack

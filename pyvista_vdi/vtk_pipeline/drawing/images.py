@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,8 +22,6 @@ from pyvista_vdi.vtk_pipeline.drawing.depth import ends_of_rays
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Image
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 
-_numbers = itertools.count()
-
 
 class VolumePicture:
     """Volume and look of a request, raycast as generation samples them.
@@ -42,8 +39,6 @@ class VolumePicture:
 
     Attributes
     ----------
-    number : int
-        By which it is known.
     bounds : tuple of float
         The volume's, model frame.
     shaded : bool
@@ -59,7 +54,6 @@ class VolumePicture:
 
     def __init__(self, request: Request, *, in_bricks: bool = False) -> None:
         self.request = request
-        self.number = next(_numbers)
         self.bounds = request.volume.bounds
         self.shaded = request.transfer_function.shading is not None
         self.pictures = 0

@@ -23,7 +23,6 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     accessors,
     announce,
     ask_for_all,
-    checked_size,
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, to_vtk, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
@@ -65,11 +64,6 @@ class VDIToImage(SceneAlgorithm):
     )
     SetElevation, GetElevation = accessors(
         "elevation", "by how much the view is lifted after turning it, degrees", 0.0, _DEGREES
-    )
-    SetWindowSize, GetWindowSize = accessors(
-        "window_size",
-        "the picture's width and height in pixels; ``None`` is :attr:`VDI.picture_size`",
-        check=checked_size,
     )
 
     def __init__(self) -> None:
