@@ -32,7 +32,7 @@ from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.measure.bench import accuracy, take_turns
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
+from pyvista_vdi.model.options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 
 Runs = Sequence[Segment]
@@ -160,7 +160,7 @@ class WorldRays:
         planes = [
             *rays.box_planes(pixel_rays, vdi.bounds),
             *(u, v, self._wide * d - u, self._high * d - v),
-            *rays.eye_plane(camera, pixel_rays),
+            *rays.view_planes(camera, pixel_rays, ()),
         ]
         if not self._parallel:
             planes.append(depth - self._nearest * np.eye(6)[0])

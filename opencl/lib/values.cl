@@ -1,5 +1,5 @@
 // Values to media: what a transfer function makes of a supersegment of a deferred VDI
-// (docs/dev/conventions.md, "Values in place of colours"); in float64: model/classify_values.py.
+// (docs/dev/conventions.md, "Values in place of colours").
 #pragma OPENCL FP_CONTRACT OFF
 
 #define ROOT_OF_3 1.7320508f

@@ -18,7 +18,6 @@ from pyvista_vdi.io.volumes.in_file import placed
 from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
-from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
@@ -93,9 +92,7 @@ def read_volume(options: argparse.Namespace, *, in_chunks: bool = False) -> Volu
         chosen = {name: getattr(options, name) for name in names}
         volume = volumes.read_volume(options.file, array=array, time=options.time_index, **chosen)
     if volume.chunked and not in_chunks:
-        remedy = "take a coarser level by --level, or make a VDI of it (pyvista-vdi generate)"
-        require_host_memory(volume.array.nbytes, f"the volume in {options.file}", remedy, free=True)
-        volume = volume.load()
+        return volume.load()  # type: ignore[no-any-return]
     return volume  # type: ignore[no-any-return]
 
 
@@ -108,7 +105,7 @@ def open_store(options: argparse.Namespace) -> Any:
     """Open the store that is named, with what is asked of it."""
     asked = {"level": options.level, "channel": options.channel, "time": options.time_index}
     chosen: Any = {name: value for name, value in asked.items() if value is not None}
-    return stores.open_store(options.file, **chosen)
+    return stores.StoredVolume(stores.store_at(options.file), **chosen)
 
 
 def is_volume(options: argparse.Namespace) -> bool:

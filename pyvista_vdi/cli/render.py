@@ -24,7 +24,7 @@ from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
 from pyvista_vdi.io import check_writable, to_bytes, write_png
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
+from pyvista_vdi.model.options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import picture_view
 from pyvista_vdi.model.whole_file import as_path, with_suffix
@@ -87,7 +87,7 @@ def view(options: argparse.Namespace) -> int:
             write_png(np.asarray(picture), target)
             print(f"{printable(options.screenshot)}: written")
             return 0
-        if (player := actor.player) is not None and len(player.series) > 1:
+        if (player := actor.player) is not None and len(player.collection) > 1:
             play, pause = player.play, player.pause
             plotter.add_key_event("space", lambda: pause() if player.playing else play())
         plotter.show()

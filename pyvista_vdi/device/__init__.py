@@ -11,16 +11,13 @@ from pyvista_vdi.device.devices import DeviceInfo, bytes_text
 from pyvista_vdi.device.launches import Launch, Runtime, padded
 from pyvista_vdi.device.memory import DeviceBuffer, kept_together
 from pyvista_vdi.device.programs import Kernel
-from pyvista_vdi.model.host_memory import GrowingArray, aligned_empty
 
 __all__ = [
     "DeviceBuffer",
     "DeviceInfo",
-    "GrowingArray",
     "Kernel",
     "Launch",
     "Runtime",
-    "aligned_empty",
     "bytes_text",
     "describe_devices",
     "get_runtime",

@@ -21,7 +21,6 @@ PROBE_RTOL = 4 * 2.0**-23
 
 _lock = threading.RLock()
 _probed: dict[str, tuple[DeviceInfo, Runtime | None]] = {}
-_default: Runtime | None = None
 
 
 def list_devices() -> list[DeviceInfo]:
@@ -52,7 +51,6 @@ def get_runtime(device: Any = None) -> Runtime:
     not usable; InvalidArgumentError for another type; MissingDependencyError without pyopencl;
     DeviceError in a fork of a process that had used or listed devices.
     """
-    global _default
     devices.require_drivers()
     if isinstance(device, Runtime):
         return device
@@ -60,17 +58,17 @@ def get_runtime(device: Any = None) -> Runtime:
     if device is None:
         device = os.environ.get(devices.DEVICE_VARIABLE, "").strip() or None
         origin = f"{devices.DEVICE_VARIABLE}="
-    if device is None and _default is not None:
-        return _default
     with _lock:
         infos = devices.find_devices()
         if device is None:
-            # The first that passes the probe, which is remembered: the drivers' list is fixed
+            # The first that passes the probe
             for info in sorted(infos, key=devices.preference):
-                _default = _probe(info)[1]
-                if _default is not None:
-                    return _default
-            raise NoDeviceError(devices.no_device_message(list_devices()))
+                if (runtime := _probe(info)[1]) is not None:
+                    return runtime
+            found = devices.listing([_probe(info)[0] for info in infos])
+            raise NoDeviceError(
+                f"no usable OpenCL device: there is {found}. Remedy: {devices.REMEDY}"
+            )
         if isinstance(device, DeviceInfo):
             device = device.selector
         if not isinstance(device, str):
@@ -80,7 +78,10 @@ def get_runtime(device: Any = None) -> Runtime:
             )
         info, runtime = _probe(devices.select(infos, device, origin))
         if runtime is None:
-            raise NoDeviceError(_unusable(info, f"{origin}{device!r}"))
+            raise NoDeviceError(
+                f"{origin}{device!r} means {info.full_name}, which is not usable: {info.reason}; "
+                f"choose another device, or {devices.REMEDY}"
+            )
         return runtime
 
 
@@ -100,22 +101,15 @@ def describe_devices() -> str:
     infos, variable = list_devices(), devices.DEVICE_VARIABLE
     selector, best = os.environ.get(variable, "").strip(), None
     try:
-        if selector:
-            best = devices.select(infos, selector, f"{variable}=")
-            if not best.usable:
-                raise NoDeviceError(_unusable(best, f"{variable}={selector!r}"))
-            last = f"Default: {best.full_name}, because {variable}={selector!r}."
-        else:
-            usable = [info for info in infos if info.usable]
-            if not usable:
-                raise NoDeviceError(devices.no_device_message(infos))
-            best = min(usable, key=devices.preference)
-            last = (
-                f"Default: {best.full_name}; GPUs come first, then CPUs, Intel's before PoCL.\n"
-                f"Choose another with device=, --device or {variable}."
-            )
+        best = get_runtime().info
+        last = f"Default: {best.full_name}" + (
+            f", because {variable}={selector!r}."
+            if selector
+            else "; GPUs come first, then CPUs, Intel's before PoCL.\n"
+            f"Choose another with device=, --device or {variable}."
+        )
     except NoDeviceError as error:
-        best, last = None, f"No default: {error}."
+        last = f"No default: {error}."
     lines = [
         f"{'*' if info is best else ' '} [{info.platform_index}:{info.device_index}] "
         f"{info.full_name}\n"
@@ -126,13 +120,6 @@ def describe_devices() -> str:
         for info in infos
     ]
     return "\n".join([*lines, last])
-
-
-def _unusable(info: DeviceInfo, asked: str) -> str:
-    return (
-        f"{asked} means {info.full_name}, which is not usable: {info.reason}; "
-        f"choose another device, or {devices.advice}"
-    )
 
 
 def _probe(info: DeviceInfo) -> tuple[DeviceInfo, Runtime | None]:
@@ -171,10 +158,9 @@ def run_probe(runtime: Runtime) -> str:
     exact = x.astype(np.float64)
     fused = exact * exact - (x * x)  # exact in float64: 48 bits
     expected = np.stack([np.expm1(-exact), np.log1p(-exact), np.exp(-exact), fused], axis=1)
-    right = {
-        "functions": np.allclose(computed, expected, rtol=PROBE_RTOL, atol=0),
-        "local memory": np.array_equal(group_sums, np.arange(len(x)).reshape(groups, -1).sum(1)),
-        "atomic functions": whole[0] == len(x) * (len(x) + 1) // 2,
-    }
-    wrong = [name for name, is_right in right.items() if not is_right]
-    return f"the probe kernel computes wrong numbers by {', '.join(wrong)}" if wrong else ""
+    right = (
+        np.allclose(computed, expected, rtol=PROBE_RTOL, atol=0)
+        and np.array_equal(group_sums, np.arange(len(x)).reshape(groups, -1).sum(1))
+        and whole[0] == len(x) * (len(x) + 1) // 2
+    )
+    return "" if right else "the probe kernel computes wrong numbers"

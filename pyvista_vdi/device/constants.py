@@ -41,17 +41,11 @@ STEEPEST = 1.5
 #: float32 numbers of a segment of a ray, and slots that a ray has to spare (``multi_vdi/pool.cl``).
 SEGMENT_SIZE, SPARE_SLOTS = 6, 2
 
-#: Those that kernels know.
-_OF_KERNELS = (
-    "STRIP COLUMN_ITEMS CELL CELL_ITEMS MACROCELL_SHIFT RUN_WORDS LISTS_PER_ITEM BUNDLE_SHIFT "
-    "BUNDLE FIRST_BITS LIST_HEADER STACK_SHIFT STACK SLABS DEPTH_CODES PLANE_FORMS STEEPEST "
-    "SEGMENT_SIZE SPARE_SLOTS"
-)
-
 
 def definitions() -> list[str]:
-    """Return the lines of OpenCL C that define them."""
-    return [f"#define {name} {literal(globals()[name])}" for name in _OF_KERNELS.split()]
+    """Return the lines of OpenCL C that define the numbers in capitals."""
+    known = [name for name in globals() if name.isupper() and not name.startswith("_")]
+    return [f"#define {name} {literal(globals()[name])}" for name in known]
 
 
 def literal(value: object) -> str:

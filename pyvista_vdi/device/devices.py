@@ -5,16 +5,18 @@ driver.
 """
 
 import contextlib
-import importlib
+import ctypes
+import importlib.metadata
 import os
 import sys
+import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from pyvista_vdi.device.icd import drivers_visible, intel_library, own_loader_bound
 from pyvista_vdi.errors import DeviceError, MissingDependencyError, NoDeviceError
 from pyvista_vdi.model.user_cache import writable_cache
 
@@ -22,11 +24,9 @@ DEVICE_VARIABLE = "PYVISTA_VDI_DEVICE"
 
 REMEDY = (
     'install a CPU runtime with  pip install "pyvista-vdi[cpu]"  (x86-64 Linux and Windows), or '
-    "Debian's and Ubuntu's package pocl-opencl-icd, or your GPU's OpenCL driver"
+    "Debian's and Ubuntu's package pocl-opencl-icd, or your GPU's OpenCL driver; if that is "
+    "installed, unset OCL_ICD_VENDORS, and use a device of pyvista_vdi before  import pyopencl"
 )
-
-#: Why a device that nobody has tried yet is not used.
-NOT_PROBED = "not probed"
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class DeviceInfo:
     usable : bool
         Whether the probe kernel ran on it and gave the right numbers.
     reason : str
-        Why it is not used; empty when usable.
+        Why it is not used; empty when usable, or not yet tried.
     platform_index, device_index : int
         Position in the driver's lists.
     selector : str
@@ -64,7 +64,7 @@ class DeviceInfo:
     global_memory: int
     max_allocation: int
     usable: bool = False
-    reason: str = NOT_PROBED
+    reason: str = ""
     platform_index: int = 0
     device_index: int = 0
     unified_memory: bool = False
@@ -115,31 +115,19 @@ def select(infos: Sequence[DeviceInfo], selector: str, origin: str) -> DeviceInf
     found = next((found for way in ways if (found := [i for i in infos if way(i)])), [])
     if len(found) == 1:
         return found[0]
+    means = f"there is no such OpenCL device; there is {listing(infos)}"
     if found:
-        raise NoDeviceError(
-            f"{origin}{selector!r} means {len(found)} devices: {listing(found)}; "
-            "name one of them by its selector"
-        )
-    raise NoDeviceError(
-        f"{origin}{selector!r}: there is no such OpenCL device; there is {listing(infos)}"
-        f"{'' if infos else f'; {advice}'}"
-    )
+        means = f"it means {len(found)} devices, {listing(found)}: name one of them by its selector"
+    raise NoDeviceError(f"{origin}{selector!r}: {means}{'' if infos else f'; {REMEDY}'}")
 
 
 def listing(infos: Sequence[DeviceInfo]) -> str:
     """Return the devices in one sentence, for error messages."""
     found = []
     for info in infos:
-        unusable = info.reason not in ("", NOT_PROBED)
-        why = f", not usable: {info.reason}" if unusable else ""
+        why = f", not usable: {info.reason}" if info.reason else ""
         found.append(f"{info.full_name} ({info.kind}, selected by {info.selector!r}{why})")
     return "; ".join(found) or "no device at all"
-
-
-def no_device_message(infos: Sequence[DeviceInfo]) -> str:
-    """Return what was found where nothing can be used, why it failed, and what to do."""
-    found = f"found {listing(infos)}" if infos else "no OpenCL driver lists a device"
-    return f"no usable OpenCL device: {found}. Remedy: {advice}"
 
 
 def bytes_text(nbytes: int) -> str:
@@ -154,8 +142,6 @@ _lock = threading.RLock()
 _found: list[DeviceInfo] | None = None
 #: The driver's own object of each device, by its selector.
 handles: dict[str, Any] = {}
-#: What to do where no device will do; what is installed already is not advised.
-advice = REMEDY
 #: Whether drivers are here that the threads they work with did not follow into a fork.
 forked = False
 
@@ -203,9 +189,8 @@ def _import_pyopencl() -> ModuleType:
             f"pyopencl cannot be imported ({exc}); install it with  pip install --upgrade pyopencl"
             "  (its wheels bring an OpenCL loader; a build from source needs libOpenCL)"
         ) from exc
-    # There pyopencl keeps the Python code that it makes for kernels, and it fails where it cannot
     try:
-        writable_cache("pytools", "pytools")
+        writable_cache("pytools", "pytools")  # for the Python code that it makes for kernels
     except OSError:
         cl._PYOPENCL_NO_CACHE = True
     return cl
@@ -217,22 +202,14 @@ def find_devices() -> list[DeviceInfo]:
     MissingDependencyError if pyopencl cannot be imported, DeviceError in a fork of a process that
     had listed them.
     """
-    global _found, advice
+    global _found
     require_drivers()
     if _found is not None:
         return _found  # likewise without a lock
     with _lock:
         if _found is None:
             with drivers_visible():
-                found = _list(_import_pyopencl())
-            library, platforms = intel_library(), {info.platform for info in found}
-            if library and not any(name.startswith("Intel(R) OpenCL") for name in platforms):
-                advice = (
-                    f"have pip's {library} listed, which no loader does: unset OCL_ICD_VENDORS and "
-                    "OCL_ICD_FILENAMES, and move  import pyopencl  below the first use of a "
-                    "device by pyvista_vdi, pyvista_vdi.list_devices() for instance"
-                )
-            _found = found
+                _found = _list(_import_pyopencl())
         return _found
 
 
@@ -262,3 +239,69 @@ def _describe(cl: ModuleType, device: Any, platform_index: int, device_index: in
         device_index=device_index,
         unified_memory=bool(device.host_unified_memory),
     )
+
+
+INTEL_LIBRARY = "libintelocl.so"
+
+
+def intel_library() -> Path | None:
+    """Return the absolute path of pip's Intel CPU runtime, or None."""
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+        files = importlib.metadata.files("intel-opencl-rt") or []
+        paths = [Path(str(each.locate())).resolve() for each in files if each.name == INTEL_LIBRARY]
+        return next((path for path in paths if path.is_file()), None)
+    return None
+
+
+@contextlib.contextmanager
+def drivers_visible() -> Iterator[None]:
+    """While inside, the loader sees the system's drivers and pip's; the environment is put back.
+
+    Import pyopencl and list the platforms inside: the loader keeps what it found. The wheel
+    ``intel-opencl-rt`` comes with a vendor file that has a build machine's path, so that no loader
+    finds its library. That of pyopencl's Linux wheels reads the folder ``OCL_ICD_VENDORS`` in place
+    of ``/etc/OpenCL/vendors``: here a temporary one, with the system's vendor files and one more.
+    """
+    library = intel_library()
+    # Who has set the variable has decided which drivers are seen
+    if library is None or sys.platform != "linux" or os.environ.get("OCL_ICD_VENDORS"):
+        yield
+        return
+    # Read the vendor files. A bare name is left to the dynamic linker; a path must lead somewhere
+    found: list[str] = []
+    for place in ("/etc/OpenCL/vendors", Path(sys.prefix, "etc", "OpenCL", "vendors")):
+        for file in sorted(Path(place).glob("*.icd")):
+            with contextlib.suppress(OSError):  # unreadable for us, hence for the loader as well
+                each = file.read_text(encoding="utf-8", errors="surrogateescape").strip()
+                if each and (os.sep not in each or Path(each).is_file()):
+                    found.append(each)
+    if not any(Path(each).name.startswith(INTEL_LIBRARY) for each in found):
+        found.append(str(library))
+    # The folder has mode 0700: nobody else can slip a library in
+    with tempfile.TemporaryDirectory(prefix="pyvista-vdi-icd-") as folder:
+        for number, each in enumerate(dict.fromkeys(found)):
+            Path(folder, f"{number:02d}.icd").write_bytes(os.fsencode(each + "\n"))
+        os.environ["OCL_ICD_VENDORS"] = folder
+        try:
+            yield
+        finally:
+            os.environ.pop("OCL_ICD_VENDORS", None)
+
+
+@contextlib.contextmanager
+def own_loader_bound() -> Iterator[None]:
+    """While inside, pyopencl is imported with its own loader, whatever loader the process has.
+
+    A program that Python runs in may have asked its own already, which then knows nothing of pip's
+    driver: what ParaView loads does, and hwloc when MPI starts.
+    """
+    flags = getattr(os, "RTLD_DEEPBIND", 0)  # of glibc
+    if not flags or not hasattr(ctypes.CDLL(None), "clGetPlatformIDs"):
+        yield
+        return
+    before = sys.getdlopenflags()
+    sys.setdlopenflags(before | flags)
+    try:
+        yield
+    finally:
+        sys.setdlopenflags(before)

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from pyvista_vdi.device import programs
+from pyvista_vdi.device.constants import literal
 from pyvista_vdi.device.devices import DeviceInfo
 from pyvista_vdi.device.memory import DeviceBuffer, Memory
 from pyvista_vdi.device.programs import Define, Kernel
 from pyvista_vdi.device.scheduling import Worker
-from pyvista_vdi.errors import InvalidArgumentError, KernelBuildError
+from pyvista_vdi.errors import InvalidArgumentError
 
 Size = int | tuple[int, ...]
 
@@ -73,9 +74,6 @@ class Launch:
                     f"argument {name!r} of kernel {kernel.name!r} is declared as {parameter.kind}; "
                     f"{value!r} of type {type(value).__name__} was given"
                 ) from exc
-            except device.cl.Error as exc:
-                doing = f"setting argument {name!r} of {kernel.name!r} of {kernel.path}"
-                raise device.failure(exc, doing) from exc
             self._buffers.pop(name, None)
             if is_buffer:
                 self._buffers[name] = value
@@ -86,12 +84,8 @@ class Launch:
 
         It returns at once; inside :meth:`Runtime.background`, when all is done, in pieces. ``size``
         is the work-items in each dimension, of which none are launched if one is 0; ``group`` those
-        of a work-group, which divide them (see :func:`padded`); arguments are as of
-        :meth:`Runtime.bind`.
-
-        Raises InvalidArgumentError or TypeError if the arguments are not the kernel's,
-        DeviceMemoryError or DeviceError if the driver refuses, sizes that do not fit each other for
-        one, or a buffer has been released.
+        of a work-group, which divide them (see :func:`padded`). Raises what :meth:`Runtime.bind`
+        does, and DeviceMemoryError or DeviceError if the driver refuses.
         """
         # Set what changes
         device, kernel = self._device, self._kernel
@@ -180,9 +174,9 @@ class Runtime(Memory):
         which they must fit; vectors are given as arrays or sequences, structures as dictionaries of
         their fields, local memory as elements for each work-group; None is a null pointer.
 
-        Raises KernelBuildError if it cannot be assembled or compiled, InvalidArgumentError if a
-        name is no argument's, TypeError if a value is not of its argument's type, and DeviceError
-        if a buffer has been released.
+        Raises KernelBuildError if it cannot be compiled, InvalidArgumentError if a name is no
+        argument's, TypeError if a value is not of its argument's type, and DeviceError if a buffer
+        has been released.
         """
         launch = Launch(self, self.kernel(path, name, defines or {}))
         launch.set(**arguments)
@@ -191,11 +185,11 @@ class Runtime(Memory):
     def kernel(self, path: str | Path, name: str, defines: Mapping[str, Define]) -> Kernel:
         """Return a kernel, compiled when first asked for, and the same for the same source.
 
-        Threads may share it. KernelBuildError if it cannot be assembled or compiled, or the file
-        has no such function. Background work compiles beside frames: that takes seconds, and not
-        the device.
+        Threads may share it. KernelBuildError if it cannot be compiled. Background work compiles
+        beside frames: that takes seconds, and not the device.
         """
-        options, source = (*self._options, *programs.define_options(defines)), programs.expand(path)
+        given = [f"-D{name}={literal(value)}" for name, value in sorted(defines.items())]
+        options, source = (*self._options, *given), programs.expand(path)
         program, key = (source, options), (source, name, options)
         if key in self._kernels:
             return self._kernels[key]
@@ -207,13 +201,5 @@ class Runtime(Memory):
                 of = self._context, self._device, str(path)
                 self._programs[program] = programs.build(*of, source, options)
             if key not in self._kernels:
-                try:
-                    made = Kernel(self._programs[program], path, name, defines)
-                except self.cl.Error as exc:
-                    names = self._programs[program].kernel_names.replace(";", ", ") or "none"
-                    raise KernelBuildError(
-                        f"{path} has no kernel {name!r}; with these options it has: {names}",
-                        options=" ".join(options),
-                    ) from exc
-                self._kernels[key] = made
+                self._kernels[key] = Kernel(self._programs[program], path, name, defines)
             return self._kernels[key]

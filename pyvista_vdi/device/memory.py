@@ -14,12 +14,14 @@ from pyvista_vdi.device import devices
 from pyvista_vdi.device.devices import DeviceInfo, bytes_text
 from pyvista_vdi.device.scheduling import Turns
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError
-from pyvista_vdi.model.host_memory import HOST_ALIGNMENT, aligned_empty
+from pyvista_vdi.model.host_memory import aligned_empty
 
 #: Page-locked host memory that a device may have, and the least worth it, bytes.
 PINNED_BYTES, LEAST_PINNED = 256 * 2**20, 2**20
 #: Bytes of the largest buffers whose memory is kept for the next ones, and of all that is kept.
 MOST_POOLED, MOST_KEPT = 64 * 2**20, 256 * 2**20
+#: Bytes of the smallest array that is read in place: a smaller one is aligned by chance.
+LEAST_IN_PLACE = 2**16
 #: Bytes that background work copies at a time: about a millisecond at a host memory's pace.
 COPY_BYTES = 4 * 2**20
 
@@ -43,7 +45,7 @@ class DeviceBuffer:
     Released by :meth:`release`, at the end of a ``with`` block, or with its last reference.
     ``nbytes`` is its size as asked for, ``name`` what it holds, for messages, and ``memory`` the
     driver's object, None when it has been given back. Where kernels write a host array's memory,
-    that is ``host`` (:meth:`Runtime.result`, :meth:`Runtime.target`).
+    that is ``host`` (:meth:`Runtime.result`).
     """
 
     memory: Any = None
@@ -67,11 +69,6 @@ class DeviceBuffer:
         """Return the memory; a second call does nothing. Enqueued work still finishes."""
         self.memory = None
         self._finalizer()
-
-    @property
-    def released(self) -> bool:
-        """Whether the memory has been given back."""
-        return self.memory is None
 
     def used(self) -> Any:
         """Return the driver's memory for a use of it; DeviceError if it has been given back."""
@@ -120,16 +117,13 @@ class Memory(Turns):
         # Re-entrant: a garbage collection inside the lock may release other buffers
         self._ledger = threading.RLock()
         self._alignment = max(1, int(self._device.mem_base_addr_align) // 8)
-        self._pinned: list[tuple[Any, Any]] = []  # that nobody has any more
+        self._pinned: dict[int, list[tuple[Any, Any]]] = {}  # by size, that nobody has any more
         self._pinned_bytes = 0
         # Of pictures and of what launches read once: to allocate memory anew for each frame takes a
         # GPU longer than to draw it, and to release it waits for the frame
         tools = self.cl.tools
         self._pool = tools.MemoryPool(tools.ImmediateAllocator(self.queue))
         self._sent: list[Any] = []  # events of copies that nobody has waited for, and their arrays
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} on {self.info.full_name}>"
 
     def failure(self, error: Any, doing: str) -> DeviceError | DeviceMemoryError:
         """Return the package's error for one of the driver's, naming what was being done."""
@@ -174,11 +168,8 @@ class Memory(Turns):
 
     @property
     def in_place_alignment(self) -> int | None:
-        """Bytes; what begins at a multiple in an :func:`aligned_empty` array is used in place.
-
-        None where a device uses no array in place.
-        """
-        return self._alignment if self.is_cpu and HOST_ALIGNMENT % self._alignment == 0 else None
+        """Bytes at a multiple of which an array begins that is used in place; None: none is."""
+        return self._alignment if self.is_cpu else None
 
     def in_place(self, array: NDArray[Any]) -> bool:
         """Return whether kernels can use a C-contiguous array where it is."""
@@ -196,44 +187,38 @@ class Memory(Turns):
         return self._take(self.cl.mem_flags.READ_WRITE, shape, np.dtype(dtype), name)
 
     def result(
-        self, shape: tuple[int, ...], dtype: DTypeLike = np.float32, name: str = "result"
+        self,
+        shape: tuple[int, ...],
+        dtype: DTypeLike = np.float32,
+        name: str = "result",
+        *,
+        out: NDArray[Any] | None = None,
     ) -> DeviceBuffer:
         """Return uninitialised memory for kernels to write, downloaded when they have.
 
         On a CPU device it is the memory of the array that :meth:`download` returns, so that nothing
-        is copied, and that array holds what is written afterwards, too. All else, and what is
-        raised, as for :meth:`buffer`.
+        is copied, and that array holds what is written afterwards, too. ``out``: that array, or
+        another that begins with it, C-contiguous and writable; a CPU device writes into it if it is
+        aligned, and leave it alone until the download. All else as for :meth:`buffer`.
         """
         access, own = self.cl.mem_flags.READ_WRITE, np.dtype(dtype)
-        if self.is_cpu and 0 not in shape:
+        if self.is_cpu and 0 not in shape and (out is None or self.in_place(out)):
             access |= self.cl.mem_flags.USE_HOST_PTR
-        return self._take(access, shape, own, name, pooled=not self.is_cpu)
-
-    def target(self, array: NDArray[Any], name: str = "array") -> DeviceBuffer:
-        """Return memory for kernels to write what an array is to hold, see :meth:`download`.
-
-        A CPU device writes into an array that is aligned for it in place, and the download into
-        that very array, or its beginning, copies nothing. The array is C-contiguous and writable;
-        what is in it is not read. Leave it alone until the download.
-        """
-        access, host = self.cl.mem_flags.READ_WRITE, None
-        if self.in_place(array):
-            access, host = access | self.cl.mem_flags.USE_HOST_PTR, array
-        return self._take(access, array.shape, array.dtype, name, host)
+        return self._take(access, shape, own, name, out, pooled=not self.is_cpu)
 
     def upload(
         self, array: NDArray[Any], name: str = "array", *, brief: bool = False
     ) -> DeviceBuffer:
         """Return an array's values on the device, for kernels to read; ``name`` says of what.
 
-        A CPU device uses an array that is C-contiguous and aligned for it in place (see
+        A CPU device uses a large array that is C-contiguous and aligned for it in place (see
         :func:`aligned_empty`): do not change the array before the buffer is released. Otherwise
         the values are copied. ``brief``: for launches that are enqueued now, and released behind
         them. Nothing waits then; do not change the array before their results are downloaded.
         Raises as :meth:`buffer` does.
         """
         array, flags = np.ascontiguousarray(array), self.cl.mem_flags
-        if self.in_place(array):
+        if array.nbytes >= LEAST_IN_PLACE and self.in_place(array):
             access = flags.READ_ONLY | flags.USE_HOST_PTR
             return self._take(access, array.shape, array.dtype, name, array)
         with kept_together() as keep:
@@ -261,7 +246,7 @@ class Memory(Turns):
         held, nbytes = buffer.held, buffer.nbytes
         in_place = bool(flags & cl.mem_flags.USE_HOST_PTR)
         # A caller's array takes no memory; drivers refuse size 0
-        taken = 0 if host is not None else max(nbytes, dtype.itemsize)
+        taken = 0 if in_place and host is not None else max(nbytes, dtype.itemsize)
         try:
             # Refuse what the device has no room for
             with self._ledger:
@@ -289,16 +274,11 @@ class Memory(Turns):
                     held.memory = cl.Buffer(self._context, flags, hostbuf=host)
                 else:
                     held.memory = cl.Buffer(self._context, flags, size=taken)
-        except BaseException as error:
+        except BaseException:
             buffer.release()  # now: whoever keeps the error keeps this frame
-            if isinstance(error, MemoryError) and not isinstance(error, DeviceMemoryError):
-                raise DeviceMemoryError(
-                    f"there is no host memory for the buffer {name!r} of {bytes_text(nbytes)}: "
-                    f"close other programs, or {_SMALLER}"
-                ) from error
             raise
         held.in_place, buffer.memory = in_place, held.memory
-        buffer.host = host if flags & cl.mem_flags.READ_WRITE else None
+        buffer.host = host if in_place and flags & cl.mem_flags.READ_WRITE else None
         return buffer
 
     def _release(self, held: Held) -> None:
@@ -320,32 +300,24 @@ class Memory(Turns):
         That is scarce: what :data:`PINNED_BYTES` has no room for is in ordinary memory.
         """
         cl, nbytes = self.cl, math.prod(shape) * dtype.itemsize
+        size = 1 << (nbytes - 1).bit_length()  # so that windows of other sizes use it, too
         with self._ledger:
-            sizes = [mapped.nbytes for _, mapped in self._pinned]
-            if nbytes not in sizes and self._pinned_bytes + nbytes > PINNED_BYTES:
-                while self._pinned:
-                    block, mapped = self._pinned.pop()
-                    mapped.base.release(self.queue)
-                    block.release()
-                    self._pinned_bytes -= mapped.nbytes
-            if nbytes in sizes:
-                block, mapped = self._pinned.pop(sizes.index(nbytes))
-            elif self._pinned_bytes + nbytes > PINNED_BYTES:
+            free = self._pinned.setdefault(size, [])
+            if not free and self._pinned_bytes + size > PINNED_BYTES:
                 return np.empty(shape, dtype)
-            else:
-                access = cl.map_flags.READ | cl.map_flags.WRITE
-                flags = cl.mem_flags.READ_WRITE | cl.mem_flags.ALLOC_HOST_PTR
-                try:
-                    block = cl.Buffer(self._context, flags, nbytes)
-                    mapped, _ = cl.enqueue_map_buffer(
-                        self.queue, block, access, 0, (nbytes,), np.uint8
-                    )
-                except cl.Error:
-                    return np.empty(shape, dtype)
-                self._pinned_bytes += nbytes
+            try:
+                if not free:
+                    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.ALLOC_HOST_PTR
+                    block, access = cl.Buffer(self._context, flags, size), cl.map_flags.WRITE
+                    place = self.queue, block, access, 0, (size,), np.uint8
+                    free.append((block, cl.enqueue_map_buffer(*place)[0]))
+                    self._pinned_bytes += size
+            except cl.Error:
+                return np.empty(shape, dtype)
+            block, mapped = free.pop()
         # Views have this array as their base, so that it lives as long as they do
-        array = np.frombuffer(memoryview(mapped), dtype)
-        weakref.finalize(array, self._pinned.append, (block, mapped)).atexit = False
+        array = np.frombuffer(memoryview(mapped)[:nbytes], dtype)
+        weakref.finalize(array, free.append, (block, mapped)).atexit = False
         return array.reshape(shape)
 
     def download(self, buffer: DeviceBuffer, out: NDArray[Any] | None = None) -> NDArray[Any]:

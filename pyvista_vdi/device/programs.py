@@ -6,12 +6,10 @@ with ``#line`` marks, and compiled once per device, source and options; threads 
 
 import contextlib
 import hashlib
-import itertools
 import logging
 import operator
 import os
 import re
-import sqlite3
 import threading
 from collections.abc import Mapping
 from functools import cache
@@ -22,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyvista_vdi.device.constants import definitions, literal
+from pyvista_vdi.device.constants import definitions
 from pyvista_vdi.device.devices import opencl
 from pyvista_vdi.errors import KernelBuildError
 from pyvista_vdi.model.user_cache import user_cache
@@ -70,24 +68,20 @@ class Parameter(NamedTuple):
         raises, for what is not of its type.
         """
         dtype = self.dtype
-        if self.kind.endswith("*"):
-            if dtype is not None and self.kind.startswith("local "):
-                return cl.LocalMemory(operator.index(value) * dtype.itemsize)
-            if value is not None:
-                raise TypeError
+        pointer, local = self.kind.endswith("*"), self.kind.startswith("local ")
+        if pointer and not local and value is None:
             return _NULL
-        if dtype is None:
+        if value is None or dtype is None or pointer != local:
             raise TypeError
+        if local:
+            return cl.LocalMemory(operator.index(value) * dtype.itemsize)
         if dtype.names is not None:
             if value.keys() != set(dtype.names):
                 raise TypeError(f"fields missing or unknown: {value.keys() ^ set(dtype.names)}")
             return np.array(tuple(map(value.__getitem__, dtype.names)), dtype)
-        if value is None:
-            raise TypeError
-        converted = np.array(value, dtype.base) if dtype.shape else dtype.type(value)
-        if converted.shape != dtype.shape or (
-            dtype.base.kind != "f" and np.any(converted != value)
-        ):
+        converted = np.array(value, dtype.base)
+        whole = dtype.base.kind != "f"
+        if converted.shape != dtype.shape or (whole and np.any(converted != value)):
             raise TypeError
         return converted
 
@@ -107,13 +101,30 @@ def parameters_of(
                 fields |= {each: inner[each] for each in inner.names}
             else:
                 fields |= {each: _dtype(kind, known) for each in names}
-        if not any(kind is None for kind in fields.values()):
-            known[structure] = _laid_out(fields)
+        if any(kind is None for kind in fields.values()):
+            continue
+        # Laid out as in OpenCL C: each field aligned to its size
+        offsets, end, sizes = [], 0, [kind.itemsize for kind in fields.values() if kind]
+        for size in sizes:
+            offsets.append(-(-end // size) * size)
+            end = offsets[-1] + size
+        layout: Any = {"names": list(fields), "formats": list(fields.values())}
+        layout |= {"offsets": offsets, "itemsize": -(-end // max(sizes)) * max(sizes)}
+        known[structure] = np.dtype(layout)
+    # Read the arguments; what is the same in several kernels is a macro
+    written = re.search(rf"(?:__kernel|KERNEL_OF_LANES)\s+void\s+{name}\s*\(([^)]*)\)", source)
+    if written is None:
+        return {}  # the compiler will say so
+    text = written[1]
+    for macro, expanded in _PARAMETERS.findall(source):
+        text = re.sub(rf"\b{macro}\b", lambda _, to=expanded: to.replace("\\", " "), text)
     found: dict[str, Parameter] = {}
-    for argument, declared in written_arguments(source, name).items():
-        element = declared.removeprefix("local ").removesuffix("*")
+    for each in text.replace("*", " * ").split(","):
+        words = each.split()
+        element = next(word for word in words if word not in _QUALIFIERS)
+        declared = "local " * ("__local" in words) + element + "*" * ("*" in words)
         dtype = _dtype(str(defines.get(element, element)), known)
-        found[argument] = Parameter(len(found), declared, dtype)
+        found[words[-1]] = Parameter(len(found), declared, dtype)
     return found
 
 
@@ -124,39 +135,9 @@ def _dtype(kind: str, known: Mapping[str, np.dtype[Any]]) -> np.dtype[Any] | Non
     return number if number is None or count == 1 else np.dtype((number, (count,)))
 
 
-def _laid_out(fields: Mapping[str, Any]) -> np.dtype[Any]:
-    """Return the type of a structure, laid out as in OpenCL C: each field aligned to its size."""
-    offsets, end, sizes = [], 0, [kind.itemsize for kind in fields.values()]
-    for size in sizes:
-        offsets.append(-(-end // size) * size)
-        end = offsets[-1] + size
-    layout: Any = {"names": list(fields), "formats": list(fields.values()), "offsets": offsets}
-    layout["itemsize"] = -(-end // max(sizes)) * max(sizes)
-    return np.dtype(layout)
-
-
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _STRUCTURE = re.compile(r"typedef struct\s*\{([^}]*)\}\s*(\w+);")
 _PARAMETERS = re.compile(r"#define (\w+_PARAMETERS)((?:[^\n]*\\\n)*[^\n]*)")
-
-
-def written_arguments(source: str, name: str) -> dict[str, str]:
-    """Return a kernel's arguments as OpenCL C has them: types by name, ``"local ulong*"``, say.
-
-    What is the same in several kernels is a macro whose name ends in ``_PARAMETERS``.
-    """
-    found = re.search(rf"(?:__kernel|KERNEL_OF_LANES)\s+void\s+{name}\s*\(([^)]*)\)", source)
-    if found is None:
-        return {}  # the compiler will say so
-    written = found[1]
-    for macro, expanded in _PARAMETERS.findall(source):
-        written = re.sub(rf"\b{macro}\b", lambda _, to=expanded: to.replace("\\", " "), written)
-    arguments = {}
-    for each in written.replace("*", " * ").split(","):
-        words = each.split()
-        kind = next(word for word in words if word not in _QUALIFIERS)
-        arguments[words[-1]] = "local " * ("__local" in words) + kind + "*" * ("*" in words)
-    return arguments
 
 
 _QUALIFIERS = {"__global", "__local", "__constant", "const", "volatile", "restrict"}
@@ -167,15 +148,7 @@ _INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]')
 
 def read_resource(path: str) -> str:
     """Return the text of a file of the package ``pyvista_vdi.opencl``: ``"lib/rays.cl"``, say."""
-    try:
-        return files("pyvista_vdi.opencl").joinpath(path).read_text(encoding="utf-8")
-    except (FileNotFoundError, IsADirectoryError) as exc:
-        raise KernelBuildError(f"no kernel file {path!r} in pyvista_vdi.opencl") from exc
-
-
-@cache
-def _expanded(path: str) -> str:
-    return _with_includes(path, read_resource(path))
+    return files("pyvista_vdi.opencl").joinpath(path).read_text(encoding="utf-8")
 
 
 def expand(path: str | Path) -> str:
@@ -184,17 +157,14 @@ def expand(path: str | Path) -> str:
     Each file is expanded where it is first included, outside ``#if``, and left out afterwards, so
     files need no include guards. A string is a path inside ``pyvista_vdi.opencl``; a Path is any
     file on disk (tests and users' own kernels), whose includes are taken from there.
-    KernelBuildError if a file is missing.
     """
     if isinstance(path, str):
-        return _expanded(path)
-    try:
-        return _with_includes(path.name, path.read_text(encoding="utf-8"))
-    except OSError as exc:
-        raise KernelBuildError(f"the kernel file {str(path)!r} cannot be read: {exc}") from exc
+        return _with_includes(path)
+    return _with_includes(path.name, path.read_text(encoding="utf-8"))
 
 
-def _with_includes(name: str, text: str) -> str:
+@cache
+def _with_includes(name: str, text: str | None = None) -> str:
     lines: list[str] = []
     seen = {name}
 
@@ -211,20 +181,12 @@ def _with_includes(name: str, text: str) -> str:
                 append(found[1], read_resource(found[1]))
             lines.append(f'#line {number + 1} "{name}"')
 
-    append(name, text)
+    append(name, read_resource(name) if text is None else text)
     return "\n".join([*definitions(), *lines]) + "\n"
 
 
-LOG_LINES_SHOWN = 30
-
 _logger = logging.getLogger(__name__)
-_program_numbers = itertools.count(1)
 _kernel_lock = threading.RLock()
-
-
-def define_options(defines: Mapping[str, Define]) -> tuple[str, ...]:
-    """Return ``-D`` options in sorted order."""
-    return tuple(f"-D{name}={literal(value)}" for name, value in sorted(defines.items()))
 
 
 class Kernel:
@@ -247,11 +209,7 @@ class Kernel:
         cl: Any = opencl()
         # pyopencl makes Python code for each, under names that it takes for free in two threads
         with _kernel_lock:
-            try:
-                return cl.Kernel(self._program, self.name)
-            except sqlite3.Error:  # the file in which it keeps that code cannot be used
-                cl._PYOPENCL_NO_CACHE = True
-                return cl.Kernel(self._program, self.name)
+            return cl.Kernel(self._program, self.name)
 
 
 def build(context: Any, device: Any, path: str, source: str, options: tuple[str, ...]) -> Any:
@@ -264,71 +222,45 @@ def build(context: Any, device: Any, path: str, source: str, options: tuple[str,
     cl: Any = opencl()
     joined = " ".join(options)
     call = {"options": joined.encode(), "devices": [device]}
-    kept = import_module("pyopencl.characterize").has_src_build_cache(device)  # by the driver
-    place = None if kept else _place(device, joined, source)
-    binary = _read(place)
-    if binary is not None:
-        with contextlib.suppress(cl.Error):  # made for another processor of that name
-            program = cl._cl._Program(context, [device], [binary])
+    # Find its file in the cache, unless the driver has one
+    place, folder = None, user_cache()
+    kept = import_module("pyopencl.characterize").has_src_build_cache(device)
+    if folder is not None and not kept and os.environ.get("PYOPENCL_NO_CACHE") != "1":
+        names = ("vendor", "name", "version")
+        driver = [getattr(each, name) for each in (device.platform, device) for name in names]
+        key = repr((driver, device.driver_version, joined, source))
+        place = folder / "programs" / hashlib.sha256(key.encode()).hexdigest()
+    with contextlib.suppress(cl.Error, OSError):  # made for another processor of that name
+        if place is not None and place.exists():
+            program = cl._cl._Program(context, [device], [place.read_bytes()])
             program._build(**call)
             return cl.Program(program)
 
     program = cl._cl._Program(context, source)
-    level = logging.INFO if next(_program_numbers) == 1 else logging.DEBUG
-    _logger.log(level, "compiling kernels: %s", path)
+    _logger.debug("compiling kernels: %s", path)
     try:
         program._build(**call)
     except cl.Error as exc:
         log = _log(program, device) or str(exc)
-        lines = [line for line in log.splitlines() if line.strip()]
-        if len(lines) > LOG_LINES_SHOWN:
-            left_out = len(lines) - LOG_LINES_SHOWN
-            lines[LOG_LINES_SHOWN:] = [f"... {left_out} more lines in the error's .log"]
         raise KernelBuildError(
             f"{path} does not compile on {device.platform.name.strip()} / "
-            f"{device.name.strip()} with {joined}:\n" + "\n".join(lines),
+            f"{device.name.strip()} with {joined}:\n{log}",
             log=log,
             options=joined,
             source=source,
         ) from exc
     _logger.debug("%s: %s", path, _log(program, device))
-    _write(place, program)
+    if place is not None:
+        (binary,) = program.get_info(cl.program_info.BINARIES)
+        with contextlib.suppress(OSError):  # a full disk, say: it is compiled again
+            place.parent.mkdir(exist_ok=True)
+            new = place.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
+            try:
+                new.write_bytes(binary)
+                new.replace(place)  # whole, or not at all
+            finally:
+                new.unlink(missing_ok=True)
     return cl.Program(program)
-
-
-def _place(device: Any, options: str, source: str) -> Path | None:
-    """Return the file of a compiled program in the cache; None where there is none."""
-    if os.environ.get("PYOPENCL_NO_CACHE", "").lower() in ("1", "true", "yes", "on"):
-        return None
-    folder = user_cache()
-    names = ("vendor", "name", "version")
-    driver = [getattr(each, name) for each in (device.platform, device) for name in names]
-    key = repr((driver, device.driver_version, options, source))
-    return folder and folder / "programs" / hashlib.sha256(key.encode()).hexdigest()
-
-
-def _read(place: Path | None) -> bytes | None:
-    """Return a program that was kept, unless it is damaged."""
-    try:
-        content = place.read_bytes() if place else b""
-    except OSError:
-        return None
-    return content[32:] if hashlib.sha256(content[32:]).digest() == content[:32] else None
-
-
-def _write(place: Path | None, program: Any) -> None:
-    """Keep a compiled program."""
-    if place is None:
-        return
-    (binary,) = program.get_info(opencl().program_info.BINARIES)
-    with contextlib.suppress(OSError):  # a full disk, say: it is compiled again
-        place.parent.mkdir(exist_ok=True)
-        new = place.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
-        try:
-            new.write_bytes(hashlib.sha256(binary).digest() + binary)
-            new.replace(place)  # whole, or not at all
-        finally:
-            new.unlink(missing_ok=True)
 
 
 def _log(program: Any, device: Any) -> str:

@@ -25,12 +25,8 @@ SHARE = 0.3
 SHORTEST_TURN = 0.001
 #: A piece is no longer, seconds, however long frames take: a cancelled thread ends as soon.
 LONGEST_PIECE = 0.025
-#: A turn before any frame was seen, seconds.
-FIRST_TURN = 0.005
-#: Frames that "a recent frame" is the median of.
-RECENT_FRAMES = 5
-#: A turn ends when less than this share of it is left: no useful piece fits.
-LEAST_REMAINDER = 0.15
+#: Frames that "a recent frame" is the median of; before the first, one took so many seconds.
+RECENT_FRAMES, FIRST_FRAME = 5, 1 / 60
 #: Pieces of one kind of work whose slowest says how fast the next will be: more than a slice of
 #: rays has, so that a march through nothing does not make the next one through much too long.
 RECENT_PIECES = 32
@@ -83,7 +79,7 @@ class Turns:
         self._waiting: deque[Worker] = deque()
         self._holder: Worker | None = None  # whose turn it is
         self._owed = False  # a frame has ended while background work waited
-        self._recent: deque[float] = deque(maxlen=RECENT_FRAMES)
+        self._recent: deque[float] = deque([FIRST_FRAME], maxlen=RECENT_FRAMES)
 
     @contextlib.contextmanager
     def foreground(self) -> Iterator[None]:
@@ -153,14 +149,14 @@ class Turns:
         Returns the seconds that the next piece may take, infinite outside background work; raises
         Cancelled if the work is no longer wanted.
         """
-        worker, recent = self.thread.worker, list(self._recent)
+        worker = self.thread.worker
         if worker is None:
             return float("inf")
         if worker.cancelled():
             raise Cancelled("background work was cancelled")
-        turn = max(SHORTEST_TURN, SHARE * statistics.median(recent)) if recent else FIRST_TURN
+        turn = max(SHORTEST_TURN, SHARE * statistics.median(list(self._recent)))
         left = worker.turn_began + turn - time.perf_counter()
-        over = left <= LEAST_REMAINDER * turn
+        over = left <= 0.15 * turn  # no useful piece fits
         with self._changed:  # throughout, so that who is let in finds this thread waiting already
             if (over and (self._arriving or self._waiting)) or worker.paused():
                 self._end_turn(worker)

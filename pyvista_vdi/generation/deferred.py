@@ -17,7 +17,7 @@ from pyvista_vdi.model.options import (
     record,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import lengths_of, with_arrays
+from pyvista_vdi.model.vdi import lengths_of, made_vdi
 from pyvista_vdi.model.volume import Volume
 
 #: Optical depth of a voxel's length of what is kept: so little that float32 sums it up as a length,
@@ -98,7 +98,7 @@ def generate_deferred(
     for name in ("transfer_function", "opacity_unit_distance", "view_cone"):
         metadata.pop(name)
     arrays = made.arrays._replace(color=color, optical_depth=spread)
-    lists = with_arrays(made, arrays, metadata=metadata)
+    lists = made_vdi(arrays, made, metadata=metadata)
     about = {
         "version": 1,
         "value_range": (low, high),

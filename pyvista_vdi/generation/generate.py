@@ -5,7 +5,7 @@ from typing import Any
 from pyvista_vdi._version import __version__
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import Cancelled
-from pyvista_vdi.generation.list_arrays import GrowingLists, require_room
+from pyvista_vdi.generation.list_arrays import GrowingLists
 from pyvista_vdi.generation.march import March, Records
 from pyvista_vdi.generation.slices import Slices
 from pyvista_vdi.model.options import GenerationRequest
@@ -30,7 +30,6 @@ def generate_vdi(request: GenerationRequest) -> VDI:
     volume, options, progress = request.volume, request.options, request.progress
     camera, size = request.camera, request.window_size
     width, height = size
-    require_room(0, size)
     report(progress, 0.0)  # first: a bar says that kernels are compiled
     runtime = get_runtime(request.device)
     slices = Slices(runtime, size, options)
@@ -65,10 +64,10 @@ def generate_vdi(request: GenerationRequest) -> VDI:
         arrays = lists.staying()
     report(progress, 1.0)
     return made_vdi(
-        camera,
-        size,
         arrays,
-        volume.bounds,
+        camera=camera,
+        window_size=size,
+        bounds=volume.bounds,
         depth_origin=records.depth_origin,
         metadata={**made_from(request, medium, runtime.info.name), **request.metadata},
     ).with_precision(options.precision)

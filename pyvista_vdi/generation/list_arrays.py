@@ -9,15 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import (
-    DeviceBuffer,
-    GrowingArray,
-    Runtime,
-    aligned_empty,
-    kept_together,
-)
+from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together
 from pyvista_vdi.device.constants import GROUP, LISTS_PER_ITEM
-from pyvista_vdi.model.host_memory import require_host_memory
+from pyvista_vdi.model.host_memory import GrowingArray, aligned_empty, require_host_memory
 from pyvista_vdi.model.packing import Arrays
 
 #: A VDI's arrays of supersegments, as kernels and as messages call them, and an element's shape.
@@ -100,7 +94,7 @@ def bring_to_host(runtime: Runtime, nbytes: int) -> None:
     known[:] = map(weakref.ref, living)
 
 
-class GrowingLists:
+class GrowingLists(contextlib.AbstractContextManager["GrowingLists"]):
     """A VDI's arrays while slices of lists are written into them, one behind the other.
 
     A device that uses arrays in place writes them in the host's memory. Room for every list at its
@@ -123,9 +117,10 @@ class GrowingLists:
     ) -> None:
         self._runtime, self._size, self._limit = runtime, size, limit
         self._most = size[0] * size[1] * limit  # supersegments
-        self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
         self._made = 0  # lists, those of the last slice included
         self._known = 0  # supersegments of all lists whose sum is known here
+        self._require_room()
+        self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
         self._begin = self._end = 0  # supersegments that the buffers hold
         self._wait: Callable[[], None] | None = None  # for the sum with the last slice
         self._sum = np.zeros(1, np.uint64)
@@ -138,7 +133,8 @@ class GrowingLists:
         bring_to_host(runtime, SUPERSEGMENT_BYTES * self._room)
         with kept_together() as keep:
             sums = keep(runtime.buffer((blocks_to_sum(slice_lists),), np.uint64, "sums of lengths"))
-            offsets = keep(runtime.target(self._offsets, "list offsets"))
+            place = self._offsets
+            offsets = keep(runtime.result(place.shape, np.uint64, "list offsets", out=place))
             runtime.fill(offsets, 0, 1)
             shared = {"partial": GROUP, "sums": sums}
             self._sum_lengths = runtime.bind("generation/offsets.cl", "sum_lengths", **shared)
@@ -151,9 +147,6 @@ class GrowingLists:
             except BaseException:
                 self._release_targets()
                 raise
-
-    def __enter__(self) -> "GrowingLists":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._release_targets()
@@ -182,9 +175,18 @@ class GrowingLists:
         self._wait()
         self._wait = None
         begin, self._known = self._known, int(self._sum[0])
-        require_room(self._known, self._size)
+        self._require_room()
         if self._known > self._end:
             self._make_room(begin, self._known)
+
+    def _require_room(self) -> None:
+        """Refuse to go on where the host cannot hold what is known of the VDI."""
+        width, height = self._size
+        require_host_memory(
+            self._known * SUPERSEGMENT_BYTES + 8 * width * height,
+            f"a VDI of {width} x {height} lists",
+            "lower the window size or max_supersegments, or raise tolerance",
+        )
 
     def finished(self) -> Arrays:
         """Return the arrays, on the host."""
@@ -218,7 +220,8 @@ class GrowingLists:
         self._begin, self._end = begin, max(end, min(room, begin + self._largest))
         for name, array in self._arrays.items():
             part: NDArray[Any] = array.part(begin, self._end)
-            self._targets[name] = self._runtime.target(part, _ARRAYS[name][0])
+            target = self._runtime.result(part.shape, name=_ARRAYS[name][0], out=part)
+            self._targets[name] = target
 
     def _collect(self, made: int) -> None:
         """Wait until so many supersegments are in the host's arrays; in place, release buffers."""
@@ -239,12 +242,3 @@ class GrowingLists:
 def blocks_to_sum(lists: int) -> int:
     """Return the work-groups that sum up the lengths of so many lists."""
     return -(-lists // (GROUP * LISTS_PER_ITEM))
-
-
-def require_room(supersegments: int, size: tuple[int, int]) -> None:
-    """Refuse to go on where the host cannot hold a VDI of at least so many supersegments."""
-    require_host_memory(
-        supersegments * SUPERSEGMENT_BYTES + 8 * size[0] * size[1],
-        f"a VDI of {size[0]} x {size[1]} lists",
-        "lower the window size or max_supersegments, or raise tolerance",
-    )

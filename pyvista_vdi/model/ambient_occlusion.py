@@ -105,13 +105,19 @@ class OcclusionGrid:
     ``cell``: voxels from node to node along x, y and z. ``nodes``: nodes along x, y and z; the last
     of them may lie beyond the volume. ``step``: length of a step, model units. ``offsets``:
     midpoints of the steps from the node along each direction, in cells; float64 (directions, steps,
-    3).
+    3). ``margin``: cells that the marches reach beyond the nodes, along x, y and z, either way.
+    ``padded``: nodes with the margin on both sides. ``samples`` along each edge of the box around a
+    node whose mean opacity the node gets: half a voxel apart, as marches by default, in cells of
+    one or two voxels; then no more.
     """
 
     cell: tuple[int, int, int]
     nodes: tuple[int, int, int]
     step: float
     offsets: NDArray[np.float64]
+    margin: tuple[int, int, int]
+    padded: tuple[int, int, int]
+    samples: tuple[int, int, int]
 
     @classmethod
     def of(cls, volume: Grid, occlusion: AmbientOcclusion) -> OcclusionGrid:
@@ -127,25 +133,9 @@ class OcclusionGrid:
         directions = spread_directions(occlusion.directions) @ to_cells.T
         nodes = -(-(points - 1) // cell) + 1
         offsets = directions[:, None, :] * along[None, :, None]
-        return cls(_triple(cell), _triple(nodes), radius / steps, offsets)
-
-    @property
-    def margin(self) -> tuple[int, int, int]:
-        """Cells that the marches reach beyond the nodes, along x, y and z, either way."""
-        return _triple(np.floor(np.abs(self.offsets).max(axis=(0, 1))).astype(int) + 1)
-
-    @property
-    def padded(self) -> tuple[int, int, int]:
-        """Nodes along x, y and z with the margin on both sides."""
-        return _triple(np.array(self.nodes) + 2 * np.array(self.margin))
-
-    @property
-    def samples(self) -> tuple[int, int, int]:
-        """Samples along each edge of the box around a node whose mean opacity the node gets.
-
-        Half a voxel apart, as marches by default, in cells of one or two voxels; then no more.
-        """
-        return _triple(np.minimum(2 * np.array(self.cell), 4))
+        margin = np.floor(np.abs(offsets).max(axis=(0, 1))).astype(int) + 1
+        sizes = (margin, nodes + 2 * margin, np.minimum(2 * cell, 4))
+        return cls(_triple(cell), _triple(nodes), radius / steps, offsets, *map(_triple, sizes))
 
     @property
     def nbytes(self) -> int:

@@ -8,7 +8,7 @@ import importlib
 import itertools
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +20,23 @@ from pyvista_vdi.errors import InvalidVolumeError, VDIError
 #: Chunks of arrays that have none.
 _CHUNK_POINTS = 64
 
+#: Voxel types that the kernels read as they are.
+VOXEL_TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
+
+#: Types that one of those represents without loss; of 64-bit integers those up to 2^53.
+_WIDENED = {"bool": "uint8", "float16": "float32", "int64": "float64", "uint64": "float64"}
+
+#: Attributes by which arrays in files say that their values are others than those that are stored.
+_PACKING = ("scale_factor", "add_offset", "_Unsigned")
+
 
 class ChunkedArray:
     """A three-dimensional array in chunks, of which parts are read as NumPy arrays.
 
     ``source``: whatever has ``shape``, ``dtype``, ``chunks`` and is indexed by slices. ``index``:
     what is taken of a source that has more dimensions, time and channel say: a number for each axis
-    that is left out, ``slice(None)`` for z, y and x. ``checked``: turns what was read into what a
-    volume holds: widened, native, C-contiguous. ``dtype``: of that.
+    that is left out, ``slice(None)`` for z, y and x.
+
     ``shape``, ``dtype``, ``ndim``, ``size``, ``nbytes``: as of a NumPy array (z, y, x). ``chunks``:
     points of a chunk along z, y and x, some of which may have fewer. ``source``: what messages call
     it. ``lazy``: the array as Dask has it, if it does.
@@ -40,10 +49,13 @@ class ChunkedArray:
         source: Any,
         *,
         index: Sequence[int | slice] | None = None,
-        checked: Callable[[NDArray[Any]], NDArray[Any]] | None = None,
-        dtype: Any = None,
     ) -> None:
-        self.lazy = source if _library(source) == "dask" else None
+        if said := [name for name in _PACKING if name in getattr(source, "attrs", {})]:
+            raise InvalidVolumeError(
+                f"the array's values are packed ({', '.join(said)}): open it by xarray, which "
+                'unpacks them, and give pyvista_vdi.Volume(dataset["name"].data)'
+            )
+        self.lazy = source if library_of(source) == "dask" else None
         self._array = source
         self._index = tuple(index) if index is not None else (slice(None),) * 3
         if self.lazy is not None and index is not None:
@@ -57,7 +69,7 @@ class ChunkedArray:
                 "colours, Volume(numpy.asarray(array))"
             )
         file = _file_of(source)
-        self.source = f"the {_library(source)} array of shape {tuple(source.shape)}"
+        self.source = f"the {library_of(source)} array of shape {tuple(source.shape)}"
         self.source += f" in {file}" if file else ""
         if any(math.isnan(n) for n in self._array.shape):
             raise InvalidVolumeError(
@@ -66,7 +78,7 @@ class ChunkedArray:
             )
         z, y, x = (int(self._array.shape[k]) for k in kept)
         self.shape: tuple[int, int, int] = (z, y, x)
-        self.dtype = np.dtype(dtype if dtype is not None else source.dtype)
+        self.dtype = voxel_type(source.dtype)
         self.size = math.prod(self.shape)
         self.nbytes = self.size * self.dtype.itemsize
         # Dask has the lengths of all chunks along an axis
@@ -74,11 +86,8 @@ class ChunkedArray:
         self.chunks = tuple(
             min(int(np.max(chunks[k])), n) for k, n in zip(kept, self.shape, strict=True)
         )
-        self._checked = checked
-        if self.lazy is not None and (checked is not None or self.dtype != source.dtype):
-            self.lazy = self._array = self.lazy.map_blocks(
-                _held, checked, self.dtype, dtype=self.dtype
-            )
+        if self.lazy is not None and self.dtype != source.dtype:
+            self.lazy = self._array = self.lazy.map_blocks(held, dtype=self.dtype)
 
     def __getitem__(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Read a part: three slices of step 1 (z, y, x)."""
@@ -101,7 +110,7 @@ class ChunkedArray:
                 f"({type(error).__name__}: {error}): "
                 f"{remedy if self.lazy is None else 'what computes them fails'}"
             ) from error
-        return _held(found, self._checked, self.dtype)
+        return held(found)
 
     def __array__(self, *_: Any, **__: Any) -> NDArray[Any]:
         """Refuse to become one array in memory by accident."""
@@ -145,27 +154,25 @@ class ChunkedArray:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, _array=opened(state["_array"]))
 
-    def __repr__(self) -> str:
-        return f"ChunkedArray({self.source}, {self.shape} {self.dtype}, chunks={self.chunks})"
 
-
-def _library(thing: Any) -> str:
+def library_of(thing: Any) -> str:
+    """Return the name of the package that made a thing."""
     return type(thing).__module__.partition(".")[0]
 
 
 def _file_of(array: Any) -> Path | None:
     """Return an array's file, or its folder, if it is in any here."""
-    if _library(array) == "h5py":
+    if library_of(array) == "h5py":
         return Path(array.file.filename).absolute()
     # A local store has its folder as `root` in zarr 3, and as `path` in zarr 2 and by fsspec
     store = getattr(array, "store", None)
     root = Path(str(getattr(store, "root", None) or getattr(store, "path", None)))
-    return root / array.path if _library(array) == "zarr" and root.is_dir() else None
+    return root / array.path if library_of(array) == "zarr" and root.is_dir() else None
 
 
 def closed(array: Any) -> Any:
     """Return what is pickled in place of an array: an HDF5 file's is opened again."""
-    if _library(array) == "h5py":
+    if library_of(array) == "h5py":
         return os.path.abspath(array.file.filename), array.name  # noqa: PTH100 - no links
     return array
 
@@ -178,16 +185,25 @@ def opened(array: Any) -> Any:
     return importlib.import_module("h5py").File(path, "r")[name]
 
 
-def is_chunked(array: Any) -> bool:
-    """Whether an array is one that is read chunk by chunk, by who made it."""
-    return isinstance(array, ChunkedArray) or (
-        not isinstance(array, np.ndarray)
-        and _library(array) in ("dask", "zarr", "h5py")
-        and all(hasattr(array, name) for name in ("shape", "dtype", "chunks"))
-    )
+def voxel_type(dtype: Any) -> np.dtype[Any]:
+    """Return the type that voxels of a type are held as: widened, where kernels do not read it."""
+    kind = np.dtype(dtype).newbyteorder("=").name
+    if _WIDENED.get(kind, kind) not in VOXEL_TYPES:
+        known = ", ".join(VOXEL_TYPES)
+        raise InvalidVolumeError(
+            f"voxels of type {dtype} are not supported: convert to one of {known}"
+        )
+    return np.dtype(_WIDENED.get(kind, kind))
 
 
-def _held(values: Any, checked: Callable[[Any], Any] | None, dtype: Any) -> NDArray[Any]:
-    """Return what was read as a volume holds it."""
-    array = np.asarray(values) if checked is None else checked(np.asarray(values))
-    return np.ascontiguousarray(array, dtype=dtype)
+def held(values: Any) -> NDArray[Any]:
+    """Return values as a volume holds them: widened without loss, native, C-contiguous."""
+    array = np.asarray(values)
+    if array.dtype.kind in "iu" and array.dtype.itemsize == 8 and array.size:
+        widest = max(abs(int(array.min())), abs(int(array.max())))
+        if widest > 2**53:
+            raise InvalidVolumeError(
+                f"voxels of type {array.dtype} hold values up to {widest}, which float64 cannot "
+                "represent exactly: scale them, or convert them yourself"
+            )
+    return np.ascontiguousarray(array, dtype=voxel_type(array.dtype))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -21,8 +20,6 @@ PRESETS = {
     "cross": 0x0417410,
     "inverted_cross": 0x7BE8BEF,
 }
-
-_N_REGIONS = 27
 
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -63,7 +60,7 @@ class Cropping:
     normals: tuple[tuple[float, float, float], ...] = _AXES
 
     #: Every region.
-    ALL: ClassVar[int] = 2**_N_REGIONS - 1
+    ALL: ClassVar[int] = 2**27 - 1
 
     def __post_init__(self) -> None:
         planes, normals = as_floats(self.planes), as_floats(self.normals)
@@ -91,23 +88,11 @@ class Cropping:
 
     @classmethod
     def from_any(cls, cropping: Any) -> Cropping | None:
-        """Return what a user calls cropping.
+        """Return what a user calls cropping; ``None`` where nothing is cropped.
 
-        Parameters
-        ----------
-        cropping : None, Cropping, vtkVolumeMapper, sequence of six numbers, or a pair
-            A mapper's own cropping, which may be off, as VTK's GPU mapper cuts the image at its
-            input; the planes of a sub-volume; or the planes and the regions.
-
-        Returns
-        -------
-        Cropping or None
-            ``None`` where nothing is cropped.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is none of these.
+        It is None, a Cropping, the planes of a sub-volume, six numbers, or a pair of planes and
+        regions, or a mapper, whose cropping may be off, and has the planes as VTK's GPU mapper cuts
+        the image at its input. InvalidArgumentError if it is none of these.
         """
         if cropping is None or isinstance(cropping, Cropping):
             return cropping
@@ -160,26 +145,19 @@ class Cropping:
         planes = np.reshape(np.asarray(self.planes), (3, 2))
         planes = np.maximum.accumulate(planes, axis=1)  # nothing is between a low one and less
         # Within the bounds, so that a plane far away costs float32 nothing
-        low, high = np.clip(planes, box[:, :1], box[:, 1:]).T
-        there = [
-            [i for i, some in enumerate((lo > x0, hi > lo, hi < x1)) if some]
-            for (x0, x1), lo, hi in zip(box, low, high, strict=True)
-        ]
-        regions = [
-            (i, j, k)
-            for i, j, k in itertools.product(*there)
-            if self.regions >> (i + 3 * j + 9 * k) & 1
-        ]
-        cuts = np.stack([low, high], axis=1)
-        if not regions:
+        cuts = np.clip(planes, box[:, :1], box[:, 1:])
+        borders = np.column_stack([box[:, 0], cuts, box[:, 1]])
+        x, y, z = np.diff(borders, axis=1) > 0
+        there = z[:, None, None] & y[:, None] & x
+        kept = (self.regions >> np.arange(27).reshape(3, 3, 3) & 1) == 1
+        places = np.argwhere(kept & there)[:, ::-1]
+        if not len(places):
             return cuts, np.full((3, 2), np.nan)
-        ends = np.array([(min(axis), max(axis)) for axis in zip(*regions, strict=True)])
-        covered = [[i for i in t if a <= i <= b] for t, (a, b) in zip(there, ends, strict=True)]
-        if len(regions) < len(list(itertools.product(*covered))):
+        first, last = places.min(axis=0), places.max(axis=0) + 1
+        covered = tuple(slice(a, b) for a, b in zip(first[::-1], last[::-1], strict=True))
+        if (there & ~kept)[covered].any():
             return cuts, None
-        borders = np.stack([box[:, 0], low, high, box[:, 1]], axis=1)
-        kept = np.stack([borders[range(3), ends[:, 0]], borders[range(3), ends[:, 1] + 1]], axis=1)
-        return cuts, kept
+        return cuts, np.stack([borders[range(3), first], borders[range(3), last]], axis=1)
 
 
 def _of_image(planes: Sequence[float], image: Any) -> tuple[Any, Any]:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVDIError
-from pyvista_vdi.model.checks import as_number, as_range
-from pyvista_vdi.model.packing import check_precision
-from pyvista_vdi.model.vdi import VDI, Lists, lengths_of, with_arrays
+from pyvista_vdi.model.checks import as_number, as_range, one_of
+from pyvista_vdi.model.packing import PRECISIONS
+from pyvista_vdi.model.vdi import VDI, Lists, lengths_of, made_vdi
 
 Floats = NDArray[np.float64]
 
@@ -124,7 +124,7 @@ class DeferredVDI(Lists):
         In 8 bytes depths have 14 bits of the list's extent, the mean 3825 steps over the range of
         values, the spread 4 significant bits and the share 8 bits.
         """
-        if check_precision(precision) == self.precision:
+        if one_of(precision, "precision", PRECISIONS) == self.precision:
             return self
         lists = self.lists
         mean = self.mean.astype(np.float64)
@@ -136,7 +136,7 @@ class DeferredVDI(Lists):
             fraction, exponent = np.frexp(spread)
             spread = np.ldexp(np.round(fraction * 16) / 16, exponent)
         color = np.stack([mean, low, self.share], axis=1).astype(np.float32)
-        plain = with_arrays(lists, lists.arrays._replace(color=color, optical_depth=spread))
+        plain = made_vdi(lists.arrays._replace(color=color, optical_depth=spread), lists)
         return DeferredVDI(plain.with_precision(precision), self.about)
 
     def classified(self, **look: Any) -> VDI:
@@ -149,7 +149,7 @@ class DeferredVDI(Lists):
             ``opacity``, ``clim`` (the range of values by default), ``n_colors``,
             ``flip_scalars``, ``log_scale``, ``opacity_unit_distance``; or ``volume_property`` or
             ``transfer_function`` in place of them. And ``device``, where it is computed: by
-            default as for :func:`pyvista_vdi.render`, and on the host where there is none.
+            default as for :func:`pyvista_vdi.render`.
 
         Returns
         -------
@@ -160,7 +160,7 @@ class DeferredVDI(Lists):
         ------
         UnsupportedError
             If the transfer function asks for light or gradient opacity, which no list knows.
-        InvalidArgumentError, MissingDependencyError
+        InvalidArgumentError, MissingDependencyError, NoDeviceError
             As for :func:`pyvista_vdi.generate`.
 
         Examples

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -19,9 +19,6 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import Number, as_flag, as_vector, one_of
 
 Vector: TypeAlias = tuple[float, float, float]
-
-#: What a light's place is relative to.
-KINDS = ("headlight", "camera", "scene")
 
 
 @dataclass(frozen=True)
@@ -42,11 +39,8 @@ class Shading:
     specular_power: float = 10.0
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = _number(item.name, getattr(self, item.name))
-            if value < 0:
-                raise InvalidArgumentError(f"{item.name} must be 0 or above; got {value}")
-            object.__setattr__(self, item.name, value)
+        for name, value in vars(self).copy().items():
+            object.__setattr__(self, name, Number("0 or above", name=name)(value))
 
 
 @dataclass(frozen=True)
@@ -89,13 +83,13 @@ class Light:
     intensity: float = 1.0
 
     def __post_init__(self) -> None:
-        one_of(self.kind, "a light's kind", KINDS)
+        one_of(self.kind, "a light's kind", ("headlight", "camera", "scene"))
         put = object.__setattr__
-        vectors = ("position", "focal_point", "ambient", "diffuse", "specular", "attenuation")
-        for name in vectors:
+        for name in ("position", "focal_point", "ambient", "diffuse", "specular", "attenuation"):
             put(self, name, as_vector(getattr(self, name), f"a light's {name}"))
+        finite = Number("a finite number", -math.inf, open_ended=True)
         for name in ("cone_angle", "exponent", "intensity"):
-            put(self, name, _number(f"a light's {name}", getattr(self, name)))
+            put(self, name, replace(finite, name=f"a light's {name}")(getattr(self, name)))
         put(self, "positional", as_flag(self.positional, "a light's positional"))
         if self.kind == "headlight":  # wherever the eye is, it is the same light
             put(self, "position", Light.position)
@@ -166,16 +160,9 @@ class Lights:
     def from_any(cls, lights: Any) -> Lights:
         """Return what a user calls lights.
 
-        Parameters
-        ----------
-        lights : None, Lights, vtkRenderer, or iterable of Light or vtkLight
-            ``None`` is one headlight. Of a renderer, the lights that are switched on are taken as
-            they are now, and a headlight where none is on, which is what VTK would make.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is something else.
+        ``None`` is one headlight. Of a renderer, the lights that are switched on are taken as they
+        are now, and a headlight where none is on, which is what VTK would make; else it is Lights,
+        or an iterable of Light or ``vtkLight``. InvalidArgumentError if it is something else.
         """
         if lights is None:
             return cls()
@@ -209,8 +196,3 @@ class Lights:
     def to_dict(self) -> dict[str, Any]:
         """Return what can be written to JSON."""
         return {"lights": [asdict(light) for light in self.lights], "two_sided": self.two_sided}
-
-
-def _number(name: str, value: Any) -> float:
-    check = Number("a finite number", -math.inf, open_ended=True, name=name)
-    return check(value)  # type: ignore[no-any-return]

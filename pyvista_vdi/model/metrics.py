@@ -64,15 +64,11 @@ def over_background(
         pixels = np.asarray(image)
     except ValueError:  # lists of different lengths
         pixels = np.empty(0)
-    if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or pixels.dtype.kind != "f":
+    floats = pixels.dtype.kind == "f" and pixels.size and np.isfinite(pixels).all()
+    if not floats or pixels.ndim != 3 or pixels.shape[2] not in (3, 4):
         raise InvalidArgumentError(
-            "an image is an array of floats of shape (height, width, 4), premultiplied RGBA, or "
-            f"(height, width, 3), RGB; got {pixels.dtype} of shape {pixels.shape}"
-        )
-    if not np.isfinite(pixels).all():
-        row, column = np.argwhere(~np.isfinite(pixels).all(axis=2))[0]
-        raise InvalidArgumentError(
-            f"the image is not finite: pixel (column {column}, row {row}) is {pixels[row, column]}"
+            "an image is an array of finite floats of shape (height, width, 4), premultiplied "
+            f"RGBA, or (height, width, 3), RGB; got {pixels.dtype} of shape {pixels.shape}"
         )
     behind = check_background(background)
     rgb = pixels[..., :3].astype(np.float64)
@@ -132,12 +128,9 @@ def compare_images(
             f"the images are of different sizes, {a.shape[1]} x {a.shape[0]} and "
             f"{b.shape[1]} x {b.shape[0]}: render both at one size"
         )
-    if a.size == 0:
-        raise InvalidArgumentError(f"the images are empty: their shape is {a.shape}")
     difference = np.abs(a - b)
     mean_square = float(np.mean(np.square(difference)))
-    mean, reference_mean = float(a.mean()), float(b.mean())
-    both_black = 1.0 if mean == 0 else math.inf
+    mean, black = float(a.mean()), not b.any()
     ssim = math.nan
     if min(a.shape[:2]) >= SSIM_WINDOW:
         from skimage.metrics import structural_similarity  # loads SciPy
@@ -148,5 +141,5 @@ def compare_images(
         psnr=math.inf if mean_square == 0 else -10 * math.log10(mean_square),
         # Rounded to a millionth of a step: what float64 leaves of a whole number of steps
         worst_pixel=round(float(difference.max()) * 255, 6),
-        mean_brightness_ratio=mean / reference_mean if reference_mean else both_black,
+        mean_brightness_ratio=(math.inf if mean else 1.0) if black else mean / float(b.mean()),
     )

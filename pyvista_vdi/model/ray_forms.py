@@ -146,13 +146,6 @@ def inverse_affine(matrix: Floats) -> Floats:
     return inverse
 
 
-def eye_plane(camera: Camera, rays: PixelRays) -> list[Floats]:
-    """Return the form that keeps what is in front of the eye: none in parallel projection."""
-    if camera.parallel_projection:
-        return []
-    return [np.array([rays.reference_depth, 0, 0, 1.0, 0, 0])]
-
-
 def box_planes(
     rays: PixelRays, bounds: Sequence[float], normals: ArrayLike = _AXES
 ) -> list[Floats]:
@@ -164,23 +157,27 @@ def box_planes(
     return forms
 
 
-def user_planes(camera: Camera, rays: PixelRays, planes: Sequence[Sequence[float]]) -> list[Floats]:
-    """Return the forms of clipping planes of the world: :attr:`RenderOptions.clipping_planes`."""
+def view_planes(camera: Camera, rays: PixelRays, planes: Sequence[Sequence[float]]) -> list[Floats]:
+    """Return the forms that keep what is in front of the eye and of clipping planes of the world.
+
+    In parallel projection there is none of the eye. See :attr:`RenderOptions.clipping_planes`.
+    """
+    forms = [np.array([rays.reference_depth, 0, 0, 1.0, 0, 0])]
+    if camera.parallel_projection:
+        forms = []
     if len(planes) == 0:
-        return []
+        return forms
     table = np.array(planes)
     # Unit normals, scaled first: a form of one that float32 cannot hold would clip nothing
     normals = table[:, 3:] / np.abs(table[:, 3:]).max(axis=1, keepdims=True)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     matrix = camera.model_transform
-    return [
-        rays.form(normal @ matrix[:3, :3], normal @ (matrix[:3, 3] - origin))
-        for origin, normal in zip(table[:, :3], normals, strict=True)
-    ]
+    for origin, normal in zip(table[:, :3], normals, strict=True):
+        forms.append(rays.form(normal @ matrix[:3, :3], normal @ (matrix[:3, 3] - origin)))
+    return forms
 
 
-@dataclass(frozen=True)
-class CroppedRays:
+class CroppedRays(NamedTuple):
     """How a kernel crops: by what it clips to, and what is left.
 
     ``planes`` are forms to clip to: a box, or nothing at all. Six ``forms`` are positive beyond the
@@ -227,8 +224,11 @@ def direction_forms(
     return [*forms]
 
 
-def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
-    """Return forms as the kernels read them, float32 (n, 6); refuse what float32 cannot hold."""
+def packed(forms: Sequence[Floats], double_float: int = 0) -> NDArray[np.float32]:
+    """Return forms as the kernels read them, float32 (n, 6); refuse what float32 cannot hold.
+
+    As double-floats with what that rounds off them, float32 (n, 12): see ``lib/rays.cl``.
+    """
     with np.errstate(over="ignore"):
         table = np.asarray(forms, dtype=np.float32)
     if not np.isfinite(table).all():
@@ -236,12 +236,8 @@ def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
             "the view cannot be expressed in float32: positions or distances exceed 1e38 model "
             "units; scale the data and the camera"
         )
-    return table
-
-
-def packed_double_float(forms: Sequence[Floats]) -> NDArray[np.float32]:
-    """Return forms with what float32 rounds off them, float32 (n, 12): see ``lib/rays.cl``."""
-    table = packed(forms)
+    if not double_float:
+        return table
     return np.hstack([table, np.subtract(forms, table, dtype=np.float64).astype(np.float32)])
 
 

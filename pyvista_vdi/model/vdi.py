@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_bounds, as_number, as_whole
-from pyvista_vdi.model.packing import Arrays, Packed8, check_precision, lengths_of_lists, packing_of
+from pyvista_vdi.model.checks import as_bounds, as_number, as_whole, one_of
+from pyvista_vdi.model.packing import PRECISIONS, Arrays, Packed8, lengths_of_lists, packing_of
 
 if TYPE_CHECKING:
     import os
@@ -72,7 +72,8 @@ class Lists:
     @property
     def n_supersegments(self) -> int:
         """Number of supersegments in all lists."""
-        return int(self.offsets[-1])
+        known = getattr(self.lists.late, "n_supersegments", None)
+        return int(self.offsets[-1]) if known is None else known
 
     @property
     def counts(self) -> NDArray[np.int64]:
@@ -214,12 +215,6 @@ class VDI(Lists):
         return self.late if isinstance(self.late, Packed8) else None
 
     @property
-    def n_supersegments(self) -> int:
-        """Number of supersegments in all lists."""
-        known = getattr(self.late, "n_supersegments", None)
-        return super().n_supersegments if known is None else known
-
-    @property
     def color(self) -> NDArray[np.float32]:
         """Straight RGB, 0 to 1, float32 (n, 3)."""
         return self.arrays.color
@@ -273,10 +268,10 @@ class VDI(Lists):
         InvalidArgumentError
             If there is no such precision, or a list is too long for 8 bytes (above 16383).
         """
-        if check_precision(precision) == self.precision:
+        if one_of(precision, "precision", PRECISIONS) == self.precision:
             return self
         exact = precision == "exact"
-        return with_arrays(self, self.arrays if exact else packing_of(self.arrays, _nearest(self)))
+        return made_vdi(self.arrays if exact else packing_of(self.arrays, _nearest(self)), self)
 
     def __repr__(self) -> str:
         width, height = self.window_size
@@ -287,28 +282,18 @@ class VDI(Lists):
         )
 
 
-def made_vdi(
-    camera: Camera,
-    window_size: tuple[int, int],
-    arrays: Arrays | LateArrays,
-    bounds: Bounds,
-    *,
-    depth_origin: float = 0.0,
-    metadata: Mapping[str, Any] | None = None,
-) -> VDI:
-    """Return a VDI of arrays that this package made, or of what makes them; nothing is checked."""
+def made_vdi(arrays: Arrays | LateArrays, like: Lists | None = None, **attributes: Any) -> VDI:
+    """Return a VDI of arrays that this package made, or of what makes them; nothing is checked.
+
+    Attributes that are not given are those of ``like``.
+    """
     vdi = VDI.__new__(VDI)
-    vdi.camera, vdi.window_size, vdi.bounds = camera, window_size, bounds
-    vdi.depth_origin, vdi.metadata = depth_origin, dict(metadata or {})
+    for name in ("camera", "window_size", "bounds", "depth_origin", "metadata"):
+        setattr(vdi, name, attributes[name] if name in attributes else getattr(like, name))
+    vdi.metadata = dict(vdi.metadata)
     exact = isinstance(arrays, Arrays)
     vdi._arrays, vdi.late = (_read_only(arrays), None) if exact else (None, arrays)
     return vdi
-
-
-def with_arrays(vdi: Lists, arrays: Arrays | LateArrays, **changes: Any) -> VDI:
-    """Return a VDI that is like another but for its arrays, and changes of :func:`made_vdi`."""
-    names = ("camera", "window_size", "bounds", "depth_origin", "metadata")
-    return made_vdi(arrays=arrays, **{name: getattr(vdi, name) for name in names} | changes)
 
 
 def _nearest(vdi: VDI) -> float:

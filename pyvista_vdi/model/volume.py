@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
 from pyvista_vdi.model.checks import as_floats, as_vector
-from pyvista_vdi.model.chunked import ChunkedArray, is_chunked
+from pyvista_vdi.model.chunked import ChunkedArray, held, library_of
 from pyvista_vdi.model.host_memory import require_host_memory
 
 
@@ -70,16 +70,6 @@ class Grid:
         return self.length / (float(np.mean(self.dimensions)) - 1)
 
 
-#: Voxel types that the kernels read as they are.
-VOXEL_TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
-
-#: Attributes by which arrays in files say that their values are others than those that are stored.
-_PACKING = ("scale_factor", "add_offset", "_Unsigned")
-
-#: Types that one of those represents without loss for every value they can hold.
-_WIDENED = {"bool": "uint8", "float16": "float32"}
-
-
 class Volume(Grid):
     """Scalars, or colours with opacity, at the points of a uniform grid.
 
@@ -113,8 +103,11 @@ class Volume(Grid):
         the grid is not finite, positive and invertible.
     """
 
-    array: NDArray[Any]
     name: str
+    #: Whether every point has a colour of its own; the scalar is the fourth component then.
+    rgba: bool
+    #: Whether the voxels are read chunk by chunk: VDIs are then made block by block.
+    chunked: bool
     #: Of lengths, where a file says it.
     unit: str = ""
     blanked: NDArray[np.uint8] | None
@@ -129,8 +122,16 @@ class Volume(Grid):
         name: str = "values",
         blanked: NDArray[np.uint8] | None = None,
     ) -> None:
-        self.array = chunked_array(array) if is_chunked(array) else _checked_array(array)
+        self.array = _checked_array(array)
+        self.chunked = isinstance(self.array, ChunkedArray)
+        self.rgba = self.array.ndim == 4
         nz, ny, nx = self.array.shape[:3]
+        if min(nx, ny, nz) < 2:
+            raise InvalidVolumeError(
+                "the volume has only one plane of points, or none: its shape is "
+                f"{self.array.shape[:3]} (z, y, x), and a volume needs at least two points along "
+                "each axis"
+            )
         self.dimensions = nx, ny, nz
         self.spacing = as_vector(spacing, "spacing", error=InvalidVolumeError)
         self.origin = as_vector(origin, "origin", error=InvalidVolumeError)
@@ -156,10 +157,11 @@ class Volume(Grid):
                 "blanked is of volumes in memory, and this one is read chunk by chunk: load it "
                 "(Volume.load()), or write NaN where it is blank"
             )
-        if getattr(blanked, "dtype", None) != np.uint8 or blanked.shape != self.array.shape[:3]:
+        kind, shape = getattr(blanked, "dtype", type(blanked)), getattr(blanked, "shape", ())
+        if kind != np.uint8 or shape != self.array.shape[:3]:
             raise InvalidVolumeError(
                 f"blanked must be uint8 of shape {self.array.shape[:3]}, a bit for each octant; "
-                f"got {blanked!r}"
+                f"got {kind} of shape {shape}"
             )
         self.blanked = np.ascontiguousarray(blanked)
 
@@ -192,41 +194,24 @@ class Volume(Grid):
         from_vtk = registry.method("Volume.from_vtk")
         return from_vtk(image, scalars, preference)  # type: ignore[no-any-return]
 
-    @property
-    def rgba(self) -> bool:
-        """Whether every point has a colour of its own; the scalar is the fourth component then."""
-        return self.array.ndim == 4
-
-    @property
-    def chunked(self) -> bool:
-        """Whether the voxels are read chunk by chunk: VDIs are then made block by block."""
-        return isinstance(self.array, ChunkedArray)
-
-    def load(self) -> Volume:
-        """Return the volume with all its voxels in memory."""
-        array = self.array[:, :, :] if self.chunked else self.array
-        loaded = Volume(array, self.spacing, self.origin, self.direction, name=self.name)
-        loaded.unit_distance, loaded.unit = self.unit_distance, self.unit
-        return loaded
-
     def in_view(self, *cameras: Any, window_size: Sequence[int]) -> Volume:
         """Return what of several levels these views require: of one, itself."""
         return self
 
-    def load_in_view(self, *cameras: Any, window_size: Sequence[int]) -> Volume:
+    def load(self, *cameras: Any, window_size: Sequence[int] = (1, 1)) -> Volume:
         """Return the volume in memory, of several levels the one that views require.
 
-        Raises
-        ------
-        DeviceMemoryError
-            If it is read chunk by chunk, and the host has not so much memory free.
+        DeviceMemoryError if it is read chunk by chunk, and the host has not so much memory free.
         """
-        if not self.chunked:
-            return self
-        found = self.in_view(*cameras, window_size=window_size)
-        what = f"the volume {found.name}"
-        require_host_memory(found.array.nbytes, what, "open a coarser level (level=...)", free=True)
-        return found.load()
+        found = self.in_view(*cameras, window_size=window_size) if cameras else self
+        if not found.chunked:
+            return found
+        remedy = "open a coarser level (level=..., --level), or generate a VDI, block by block"
+        require_host_memory(found.array.nbytes, f"the volume {found.name}", remedy, free=True)
+        array = found.array[:, :, :]
+        loaded = Volume(array, found.spacing, found.origin, found.direction, name=found.name)
+        loaded.unit_distance, loaded.unit = found.unit_distance, found.unit
+        return loaded
 
     @property
     def scalars(self) -> NDArray[np.generic]:
@@ -234,13 +219,7 @@ class Volume(Grid):
         return self.array[..., 3] if self.rgba else self.array
 
     def finite_range(self) -> tuple[float, float]:
-        """Return the smallest and the largest scalar, NaN left out.
-
-        Raises
-        ------
-        InvalidVolumeError
-            If every value is NaN.
-        """
+        """Return the least and the largest scalar, NaN left out; InvalidVolumeError if all are."""
         low, high = self._range
         if np.isnan(low):
             raise InvalidVolumeError(
@@ -251,9 +230,8 @@ class Volume(Grid):
 
     @functools.cached_property
     def _range(self) -> tuple[float, float]:
-        array: Any = self.array
         if self.chunked:
-            return array.ends  # type: ignore[no-any-return]
+            return self.array.ends  # type: ignore[no-any-return]
         if self.array.dtype.kind != "f":
             return float(self.scalars.min()), float(self.scalars.max())
         low, high = np.fmin.reduce(self.array, axis=None), np.fmax.reduce(self.array, axis=None)
@@ -265,49 +243,12 @@ class Volume(Grid):
         return f"Volume({nx} x {ny} x {nz} {kind}, spacing={self.spacing})"
 
 
-def chunked_array(array: Any, index: Sequence[int | slice] | None = None) -> Any:
-    """Return an array that is read chunk by chunk, as a volume holds it; nothing is read yet.
-
-    ``index`` says what is taken of an array of more dimensions, as of a :class:`ChunkedArray`.
-    Values that its attributes pack, as the CF conventions have it, are refused.
-    """
-    if isinstance(array, ChunkedArray):
-        return array
-    if said := [name for name in _PACKING if name in getattr(array, "attrs", {})]:
-        raise InvalidVolumeError(
-            f"the array's values are packed ({', '.join(said)}): open it by xarray, which unpacks "
-            'them, and give pyvista_vdi.Volume(dataset["name"].data)'
-        )
-    kind, long = _voxel_type(array.dtype)
-    checked = _from_long_integers if long else None
-    found = ChunkedArray(array, index=index, checked=checked, dtype=kind)
-    _check_planes(found.shape)
-    return found
-
-
-def _check_planes(shape: tuple[int, ...]) -> None:
-    if min(shape[:3]) < 2:
-        raise InvalidVolumeError(
-            f"the volume has only one plane of points, or none: its shape is {shape[:3]} "
-            "(z, y, x), and a volume needs at least two points along each axis"
-        )
-
-
-def _voxel_type(dtype: Any) -> tuple[str, bool]:
-    """Return the type that voxels of a type are held as, and whether those are 64-bit integers."""
-    kind = np.dtype(dtype).newbyteorder("=").name
-    if kind in ("int64", "uint64"):
-        return "float64", True
-    kind = _WIDENED.get(kind, kind)
-    if kind not in VOXEL_TYPES:
-        known = ", ".join(VOXEL_TYPES)
-        raise InvalidVolumeError(
-            f"voxels of type {dtype} are not supported: convert to one of {known}"
-        )
-    return kind, False
-
-
-def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
+def _checked_array(values: Any) -> Any:
+    """Return an array as a volume holds it: in memory, or read chunk by chunk."""
+    if isinstance(values, ChunkedArray):
+        return values
+    if library_of(values) in ("dask", "zarr", "h5py") and hasattr(values, "chunks"):
+        return ChunkedArray(values)
     try:
         array = np.asarray(values)
     except (TypeError, ValueError) as error:  # lists of different lengths
@@ -318,16 +259,4 @@ def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
             "a volume is a three-dimensional array, one scalar per point, indexed [z, y, x], or "
             f"RGBA as four uint8 per point; got shape {array.shape}"
         )
-    _check_planes(array.shape)
-    kind, long = _voxel_type(array.dtype)
-    return _from_long_integers(array) if long else np.ascontiguousarray(array, dtype=kind)
-
-
-def _from_long_integers(array: NDArray[np.generic]) -> NDArray[np.generic]:
-    widest = max(abs(int(array.min())), abs(int(array.max())))
-    if widest > 2**53:
-        raise InvalidVolumeError(
-            f"voxels of type {array.dtype} hold values up to {widest}, which float64 cannot "
-            "represent exactly: scale them, or convert them yourself"
-        )
-    return np.ascontiguousarray(array, dtype=np.float64)
+    return held(array)

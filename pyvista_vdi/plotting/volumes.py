@@ -15,7 +15,6 @@ from pyvista_vdi.errors import (
     UnsupportedError,
 )
 from pyvista_vdi.io.stores import StoredVolume
-from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.vtk_pipeline.filters.convert import as_numpy, require_image, volume_to_image
 from pyvista_vdi.vtk_pipeline.vtk import vtkRectilinearGrid
@@ -28,10 +27,6 @@ _UNNAMED = "Data"
 
 def load(volume: StoredVolume) -> Volume:
     """Read a level of a store and log which; DeviceMemoryError if the host lacks the memory."""
-    remedy = "open a coarser level by pyvista_vdi.read_volume(path, level=...), or generate a VDI"
-    require_host_memory(
-        volume.array.nbytes, f"the volume in {volume.store.path}", remedy, free=True
-    )
     _log.info("%s: %s", volume.store.path, volume.describe())
     return volume.load()
 

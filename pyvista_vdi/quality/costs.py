@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -19,6 +20,9 @@ _LOST = (0.0, 0.0105, 0.013, 0.0188, 0.0319, 0.0445)
 #: of 128^3 to 256^3 voxels, 20 supersegments, middle of what was seen.
 _ANGLES = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0)
 _RISE = (1.0, 6.4, 14.0, 24.0, 34.0, 40.0)
+#: Share of that which is expected of a GPU: whole pictures of the paper's volumes took 1.6 to 4.1
+#: times as long at 30 degrees there (docs/decisions/gpu.md).
+_ON_GPU = 0.07
 #: Weight of the newest frame in the mean of what frames took.
 _NEWEST = 0.4
 #: SSIM that the other way must gain, and share of the time at rest that it must save, to be taken:
@@ -31,24 +35,43 @@ _UNKNOWN_LOSS, _LOST_FROM = 0.012, 5.0
 
 @dataclass(frozen=True)
 class Costs:
-    """Seconds that a ray takes, by frames' means that forget, and which way was chosen last.
+    """What a picture takes, by the last frames of both ways, and which way was chosen last.
 
-    Those of a VDI are as if at its generating view: there rays are cheapest (:func:`rise`). The
-    volume's take the same from everywhere, and theirs is the picture that a VDI approaches.
+    That is ``fixed + rays * each`` seconds. The volume's rays take the same from everywhere, and
+    theirs is the picture that a VDI approaches. ``vdi`` is what a VDI's take at its generating
+    view, where they are cheapest: from others :meth:`rise` times as much, which starts with what is
+    expected of the device's kind and follows what frames take.
     """
 
     volume: float | None = None
     vdi: float | None = None
     way: RenderMode = "vdi"
+    fixed: float = 5e-4
+    slope: float | None = None  # of the rise with the angle, over the typical one of CPUs
 
-    def took(self, way: RenderMode, angle: float, pixels: float, seconds: float) -> Costs:
-        """Note what a frame's rays have taken, through a VDI so many degrees from its view."""
+    def took(
+        self, way: RenderMode, angle: float, pixels: float, seconds: float, *, gpu: bool = False
+    ) -> Costs:
+        """Note what a picture's rays have taken, through a VDI so many degrees from its view."""
         if not (pixels >= 1 and seconds > 0):
             return self
-        each = seconds / pixels / (1.0 if way == "volume" else rise(angle))
-        before = getattr(self, way)
-        mean = each if before is None else before + _NEWEST * (each - before)
-        return replace(self, volume=mean) if way == "volume" else replace(self, vdi=mean)
+        own = replace(self, slope=self.slope or (_ON_GPU if gpu else 1.0))
+        rise, each = (own.rise(angle), self.vdi) if way == "vdi" else (1.0, self.volume)
+        if each is None:
+            found: Any = {way: max(seconds - self.fixed, seconds / 2) / (pixels * rise)}
+            return replace(own, **found)
+        # Divide the relative error among a ray, its rise and what is fixed, by their parts
+        rays = pixels * rise * each
+        total = rays + self.fixed
+        parts = np.array([rays, rays * (1 - 1 / rise), self.fixed]) / total
+        error = _NEWEST * math.log(seconds / total)
+        ray, slope, fixed = np.exp(error * parts / (parts @ parts)).tolist()
+        found = {way: each * ray, "slope": own.slope * slope, "fixed": self.fixed * fixed}
+        return replace(own, **found)
+
+    def rise(self, angle: float) -> float:
+        """Return what a ray takes through a VDI, over one at its view, so many degrees away."""
+        return 1 + (self.slope or 1.0) * (float(np.interp(angle, _ANGLES, _RISE)) - 1)
 
     def better(
         self, angle: float, pixels: float, seconds: float | None, ssim: float | None, bound: float
@@ -68,22 +91,17 @@ class Costs:
             return "volume"
         if self.volume is None or self.vdi is None:
             return "vdi"
-        times = {"vdi": self.vdi * rise(angle), "volume": self.volume}
+        each = {"vdi": self.vdi * self.rise(angle), "volume": self.volume}
+        times = {way: self.fixed + max(pixels, 1.0) * ray for way, ray in each.items()}
         other: RenderMode = "volume" if self.way == "vdi" else "vdi"
         if seconds is None:
             changes = times[other] < (1 - _SAVING) * times[self.way]
         else:
-            losses = {
-                way: _loss_of_pixels(t * max(pixels, 1.0) / seconds) for way, t in times.items()
-            }
+            room = max(seconds - self.fixed, 1e-9)
+            losses = {way: _loss_of_pixels((t - self.fixed) / room) for way, t in times.items()}
             losses["vdi"] += own
             changes = losses[other] < losses[self.way] - _GAIN
         return other if changes else self.way
-
-
-def rise(angle: float) -> float:
-    """Return what a ray takes through a VDI, over one at its view, so many degrees from there."""
-    return float(np.interp(angle, _ANGLES, _RISE))
 
 
 def _loss_of_pixels(too_long: float) -> float:

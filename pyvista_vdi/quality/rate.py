@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import statistics
+from collections import deque
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -25,8 +26,6 @@ _STALL = 2.0
 #: Share of a frame's time that the work gets where all else alone misses the rate: a blurred
 #: picture that is no faster helps nobody.
 _LEAST_WORK = 0.25
-#: Durations that are believed, seconds; what is outside comes from a clock at fault.
-_DURATIONS = (1e-9, 1e6)
 
 #: Least and most of what is aimed at, over the rate that is to be kept: single frames vary about
 #: their mean, and an aim at the rate makes every second one late (docs/decisions/frame_rate.md).
@@ -66,15 +65,9 @@ class FrameRate:
 
     target_fps: float = 30.0  # to be kept
     floor: float = FLOOR  # fewest samples, as a share of the full frame
-    durations: tuple[float, ...] = ()  # seconds, stalls included
     frames: tuple[_Frame, ...] = ()  # what the estimate is made of, oldest first
     doubtful: _Frame | None = None  # set aside until the next frame
     choice: int | None = None  # None: full
-
-    @property
-    def fps(self) -> float:
-        """Mean rate of the last five frames of this interaction; 0 before the first."""
-        return len(self.durations) / sum(self.durations) if self.durations else 0.0
 
     def choose(self, full: int) -> FrameRate:
         """Return the same with the samples chosen that the next frame gets, of so many."""
@@ -100,10 +93,8 @@ class FrameRate:
 
     def record(self, samples: int, work: float, seconds: float) -> FrameRate:
         """Return the same after a frame of so many samples: what they took, and all of it."""
-        least, most = _DURATIONS
-        if not (least <= work <= most and least <= seconds <= most and samples >= 1):
+        if not (work > 0 and samples >= 1):
             return self
-        durations = (*self.durations, max(work, seconds))[-RECENT_FRAMES:]
         frame, kept, doubtful = _Frame(samples, work, max(0.0, seconds - work)), self.frames, None
         # Set a stall aside until the next frame confirms it
         if kept:
@@ -111,15 +102,9 @@ class FrameRate:
             if not 1 / _STALL <= over <= _STALL:
                 before, doubtful = self.doubtful, frame
                 if before is None or (self._over(before) > 1) != (over > 1):
-                    return replace(self, durations=durations, doubtful=doubtful)
+                    return replace(self, doubtful=doubtful)
                 kept, doubtful = (before,), None
-        return replace(
-            self, durations=durations, frames=(*kept, frame)[-_MEMORY:], doubtful=doubtful
-        )
-
-    def rest(self) -> FrameRate:
-        """Return the same after the end of an interaction."""
-        return replace(self, durations=(), doubtful=None)
+        return replace(self, frames=(*kept, frame)[-_MEMORY:], doubtful=doubtful)
 
     def _over(self, frame: _Frame) -> float:
         overhead, each = self._cost()
@@ -170,9 +155,8 @@ class Pace:
         self.slow_samples = False
         self.headroom = HEADROOM
         self._beside = [0.0, 0.0]  # seconds, without multisampling and with it
-        self._interacting = False
         self._last = _SoFar()  # of a motion
-        self._way: RenderMode = "vdi"
+        self._recent: deque[float] = deque(maxlen=RECENT_FRAMES)  # seconds, of a motion
         self._floor = 0.0
         self._rates: dict[RenderMode, FrameRate] = {}
         self._resting: dict[RenderMode, _Frame] = {}  # what a full frame takes
@@ -180,10 +164,8 @@ class Pace:
     @property
     def fps(self) -> float | None:
         """Mean rate of the motion's last frames; at rest what the last frame would allow."""
-        rate = self._rates.get(self._way)
-        if self._interacting and rate is not None and rate.fps > 0:
-            return rate.fps
-        return 1 / self.seconds if self.seconds else None
+        recent = self._recent or [self.seconds or 0.0]
+        return len(recent) / sum(recent) if sum(recent) else None
 
     def late(self, seconds: float, target: float) -> bool:
         """Whether frames whose rays take so long miss a rate, and rays are what takes long."""
@@ -247,12 +229,11 @@ class Pace:
         if frame.rays:
             # The first frame began before anybody looked at the clock: its work is known
             self._record(frame, frame.work if seconds is None else seconds)
-        if self._interacting and not frame.interactive and not moving:
-            self._interacting = False
-            self._rates = {way: rate.rest() for way, rate in self._rates.items()}
+        if not (frame.interactive or moving):
+            self._recent.clear()
 
     def _record(self, frame: _SoFar, seconds: float) -> None:
-        self.seconds, self._way = seconds, frame.way
+        self.seconds = seconds
         if frame.interactive:
             # A stochastic approximation of the quantile (Robbins and Monro 1951)
             late = seconds * frame.target > _LATE * self.headroom
@@ -261,7 +242,8 @@ class Pace:
             if frame.way in self._rates:
                 rate = self._rates[frame.way]
                 self._rates[frame.way] = rate.record(frame.rays, frame.work, seconds)
-            self._interacting, self._last = True, frame
+            self._last = frame
+            self._recent.append(seconds)
         else:
             self._resting[frame.way] = _Frame(frame.rays, frame.work, seconds - frame.work)
         # Learn whether frames of a motion go without multisampling
@@ -288,14 +270,12 @@ class Pace:
             if known is not None:
                 # What the last full frame took, so that an interaction begins with no other
                 beside = self._beside[0] if self.slow_samples else known.overhead
-                rate = rate.record(known.samples, known.work, known.work + beside).rest()
+                rate = rate.record(known.samples, known.work, known.work + beside)
         return rate if rate.target_fps == target else replace(rate, target_fps=target)
 
 
 def reduced(size: tuple[int, int], share: float) -> tuple[int, int]:
     """Return the size in whole pixels, of about the same aspect, that has this share of pixels."""
-    if share >= 1:
-        return size
-    scale = math.sqrt(share)
+    scale = math.sqrt(min(share, 1.0))
     width, height = (max(1, round(edge * scale)) for edge in size)
     return width, height

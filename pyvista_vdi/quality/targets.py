@@ -1,20 +1,20 @@
-"""Resolves what is asked of a VDI to its settings: a preset by a table, a target by trials.
+"""Resolves what is asked of a VDI to its settings: a preset by a table, a target by one probe.
 
-What may be chosen is a ladder of settings (:data:`LADDER`). A goal, and each limit, is found on it
-by bisection: a VDI is made by a rung, and what it gives is measured. docs/dial.md says how well.
+What may be chosen is a ladder of settings (:data:`LADDER`). Of one rung a VDI is made, and what it
+gives is measured; what the others would give follows by a table. docs/dial.md says how well.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.device import get_runtime
@@ -22,9 +22,13 @@ from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, warn_exte
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import SSIM_WINDOW
-from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, QualityTarget
+from pyvista_vdi.model.options import (
+    FrameRequest,
+    GenerationOptions,
+    GenerationRequest,
+    QualityTarget,
+)
 from pyvista_vdi.model.packing import Precision
-from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.types import ClientLike
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import ViewErrorEstimator, world_centre
@@ -37,8 +41,7 @@ SSIM_WITHOUT_SQUARES = 0.96
 _FRAMES = 2
 #: Options that are chosen, or left no room for.
 _CHOSEN = ("max_supersegments", "tolerance", "precision")
-#: Bytes of a list and of a supersegment on a device, in the 8-byte form: a list that is not empty
-#: has two supersegments' room for its header.
+#: Bytes on a device in the 8-byte form; a list that is not empty has a header.
 _LIST_BYTES, _SUPERSEGMENT_BYTES, _HEADER_BYTES = 4, 8, 16
 
 
@@ -48,6 +51,10 @@ class Setting:
 
     lists: float  # along an edge of the VDI's window, over the pixels of the window asked for
     max_supersegments: int
+    # 1 - SSIM, bytes and a frame's time over those of the probe: docs/decisions/dial.md
+    loss: float
+    size: float
+    time: float
     precision: Precision = "8-byte"
 
     def applied_to(self, request: GenerationRequest) -> GenerationRequest:
@@ -63,17 +70,19 @@ TARGET_ANGLE = 30.0
 
 #: What is chosen from. No rung has fewer or shorter lists than the one before it.
 LADDER = (
-    Setting(1 / 4, 10),
-    Setting(1 / 3, 10),
-    Setting(1 / 2, 10),
-    Setting(1 / 2, 15),
-    Setting(3 / 4, 15),
-    Setting(1, 15),
-    Setting(1, 20),
-    Setting(1, 30),
-    Setting(3 / 2, 30),
-    Setting(2, 30),
+    Setting(1 / 4, 10, 1.99, 0.20, 0.73),
+    Setting(1 / 3, 10, 1.56, 0.36, 0.77),
+    Setting(1 / 2, 10, 1.03, 0.81, 0.91),
+    Setting(1 / 2, 15, 1.00, 1.00, 1.00),
+    Setting(3 / 4, 15, 0.67, 2.25, 1.16),
+    Setting(1, 15, 0.39, 4.00, 1.31),
+    Setting(1, 20, 0.36, 4.64, 1.42),
+    Setting(1, 30, 0.35, 5.67, 1.57),
+    Setting(3 / 2, 30, 0.22, 12.75, 1.91),
+    Setting(2, 30, 0.15, 22.66, 2.27),
 )
+#: The rung that is made first, and by how much a rung may miss by the table and yet be tried.
+PROBE, TRIED = 3, 1.1
 #: The rungs of the names, and the mean SSIM that was measured: docs/dial.md.
 PRESETS = {"fast": (1, 0.945), "balanced": (3, 0.961), "high": (6, 0.980)}
 
@@ -115,9 +124,8 @@ def refuse_settings(target: QualityTarget, options: GenerationOptions) -> None:
 
 def bytes_of(vdi: VDI) -> int:
     """Return the bytes of a VDI on the device in its 8-byte form."""
-    occupied = int(np.count_nonzero(vdi.counts))
-    per_list = _SUPERSEGMENT_BYTES * vdi.n_supersegments + _HEADER_BYTES * occupied
-    return per_list + _LIST_BYTES * (vdi.counts.size + 1)
+    of_lists = _LIST_BYTES * (vdi.counts.size + 1) + _HEADER_BYTES * np.count_nonzero(vdi.counts)
+    return int(of_lists + _SUPERSEGMENT_BYTES * vdi.n_supersegments)
 
 
 def generate_anywhere(
@@ -138,7 +146,7 @@ def generate_anywhere(
             )
         if target:  # which takes many looks at the whole
             view, size = request.camera, request.window_size
-            loaded = request.volume.load_in_view(view, window_size=size)
+            loaded = request.volume.load(view, window_size=size)
             return generate_anywhere(request.replace(volume=loaded), target)
         return registry.generator("blocks")(request, client)  # type: ignore[no-any-return]
     if client is not None:
@@ -168,28 +176,29 @@ def generate_to_target(request: GenerationRequest, target: QualityTarget) -> VDI
     goal = 0.0 if target.ssim is None or target.quality is not None else target.ssim
     if goal > 0:
         least = 2 if goal >= SSIM_WITHOUT_SQUARES else 0
-        rung = _first(least, rung, lambda k: trials.ssim(k) >= goal)
+        found = trials.settled("loss", range(least, rung + 1), 1 - goal)
+        rung = rung if found is None else found
     wanted, missed = rung, []
     # Limits come before the goal, and of the limits bytes before frames per second
     if (most := target.max_bytes) is not None:
-        rung = _first(0, rung + 1, lambda k: bytes_of(trials.vdi(k)) > most) - 1
-        if rung < 0:
+        found = trials.settled("size", range(rung, -1, -1), most)
+        rung = found or 0
+        if found is None:
             missed.append(
                 f"max_bytes={most} cannot be kept: the smallest VDI that a target chooses has "
-                f"{bytes_of(trials.vdi(0))} bytes; allow more, or ask for a smaller window"
+                f"{trials.size(0)} bytes; allow more, or ask for a smaller window"
             )
     if (rate := target.full_fps) is not None:
-        rung = _first(0, max(rung, 0) + 1, lambda k: trials.fps(k) < rate) - 1
-        if rung < 0:
+        found = trials.settled("time", range(rung, -1, -1), 1 / rate)
+        rung = found or 0
+        if found is None:
             width, height = request.window_size
             missed.append(
                 f"{rate:g} full frames per second cannot be reached on this device: for {width} x "
-                f"{height} pixels it is {trials.fps(0):.3g} at most; ask for fewer, or for a "
-                "smaller window (a plotter keeps target_fps while the view moves by drawing fewer "
-                "pixels)"
+                f"{height} pixels it is {1 / trials.time(0):.3g} at most; ask for fewer, or for a "
+                "smaller window"
             )
-    rung = max(rung, 0)
-    vdi, ssim, given = trials.vdi(rung), trials.ssim(rung), target.given
+    vdi, ssim, given = trials.vdi(rung), 1 - trials.loss(rung), target.given
     if target.ssim is not None and (rung < wanted or ssim < goal):
         limits = " and ".join(f"{n}={given[n]}" for n in ("max_bytes", "full_fps") if n in given)
         asked = next(f"{n}={given[n]!r}" for n in ("quality", "target_ssim") if n in given)
@@ -198,17 +207,9 @@ def generate_to_target(request: GenerationRequest, target: QualityTarget) -> VDI
             + (f"what is within {limits}; allow more" if rung < wanted else "the best settings")
             + ", ask for less"
         )
-    fps = float(f"{trials.fps(rung):.3g}")
-    predicted = {"ssim": round(ssim, 4), "bytes": bytes_of(vdi), "fps": fps}
+    fps = float(f"{1 / trials.time(rung):.3g}")
+    predicted = {"ssim": round(ssim, 4), "bytes": trials.size(rung), "fps": fps}
     return _described(vdi, rung, target, request.window_size, predicted, missed)
-
-
-def _first(low: int, high: int, holds: Callable[[int], bool]) -> int:
-    """Return the first number from ``low`` on of which something holds; ``high`` if of none."""
-    while low < high:
-        middle = (low + high) // 2
-        low, high = (low, middle) if holds(middle) else (middle + 1, high)
-    return low
 
 
 def _described(
@@ -248,30 +249,40 @@ class _Trials:
         self.request = request.replace(device=get_runtime(request.device))
         camera = turned(request.camera, request.volume.bounds, TARGET_ANGLE)
         self.view = FrameRequest(camera, size, device=self.request.device)
-        self.vdi, self.ssim, self.fps = cache(self._vdi), cache(self._ssim), cache(self._fps)
-
-    @cached_property
-    def _estimator(self) -> ViewErrorEstimator:
-        asked, device = self.request, self.request.device
-        return ViewErrorEstimator(
-            asked.volume, asked.transfer_function, asked.options, device=device
-        )
+        asked = (request.volume, request.transfer_function, request.options)
+        self._estimator = ViewErrorEstimator(*asked, device=self.request.device)
+        self.vdi, self.size = cache(self._vdi), cache(self._size)
+        self.loss, self.time = cache(self._loss), cache(self._time)
 
     def _vdi(self, rung: int) -> VDI:
         return generate_vdi(LADDER[rung].applied_to(self.request))
 
-    def _ssim(self, rung: int) -> float:
-        """Estimate for the target view."""
-        return self._estimator.estimate(self.vdi(rung), self.view.camera, self.view.size).ssim
+    def _size(self, rung: int) -> int:
+        return bytes_of(self.vdi(rung))
 
-    def _fps(self, rung: int) -> float:
-        """Full frames per second."""
+    def _loss(self, rung: int) -> float:
+        """Estimate 1 - SSIM of the target view."""
+        vdi = self.vdi(rung)
+        return 1 - self._estimator.estimate(vdi, self.view.camera, self.view.size).ssim
+
+    def _time(self, rung: int) -> float:
+        """Return the seconds of a full frame."""
         seconds = []
         for _ in range(_FRAMES):
             start = time.perf_counter()
             render_vdi(self.vdi(rung), self.view)
             seconds.append(max(time.perf_counter() - start, 1e-9))
-        return 1 / min(seconds)
+        return min(seconds)
+
+    def settled(self, what: str, rungs: Sequence[int], most: float) -> int | None:
+        """Return the first of some rungs with no more loss, size or time; ``None`` if none has.
+
+        They are tried one after the other from where the table expects it.
+        """
+        measured, tabled = getattr(self, what), [getattr(each, what) for each in LADDER]
+        unit = measured(PROBE) / tabled[PROBE]
+        few = (i for i, k in enumerate(rungs) if unit * tabled[k] <= TRIED * most)
+        return next((k for k in rungs[next(few, len(rungs) - 1) :] if measured(k) <= most), None)
 
 
 def turned(camera: Camera, bounds: Sequence[float], degrees: float) -> Camera:
@@ -283,7 +294,7 @@ def turned(camera: Camera, bounds: Sequence[float], degrees: float) -> Camera:
     axis = np.asarray(camera.view_up) / np.linalg.norm(camera.view_up)
     cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
 
-    def around(point: Sequence[float]) -> NDArray[np.float64]:  # Rodrigues' formula
+    def around(point: ArrayLike) -> NDArray[np.float64]:  # Rodrigues' formula
         v = np.asarray(point) - centre
         along = axis * (axis @ v)
         return np.asarray(centre + along + (v - along) * cosine + np.cross(axis, v) * sine)

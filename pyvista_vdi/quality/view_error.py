@@ -21,8 +21,7 @@ from pyvista_vdi.errors import InvalidCameraError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.metrics import SSIM_ARGUMENTS, SSIM_WINDOW, over_background
-from pyvista_vdi.model.options import MediumOptions
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.model.options import FrameRequest, MediumOptions, RenderOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import bounds_corners
@@ -61,18 +60,16 @@ class ViewError:
     """What is known of a VDI's error in a view."""
 
     ssim: float  # predicted, of the VDI's picture against the volume's; NaN below 11 pixels
-    angle: float  # degrees, see angle_from_generating_view()
-    magnification: float  # pixels per list, see magnification()
     tiles: int  # that were rendered; 0 where the volume is not in view
 
 
 class ViewErrorEstimator:
     """Estimates the error of VDIs of one volume; keeps the volume on the device.
 
-    The volume is sampled as ``medium`` and ``changes`` of its options say: as it was when the VDIs
-    were generated, but for the lights, which are those of the view that is judged. An estimate
-    takes ``tiles`` of ``tile_size`` pixels along each edge; what SSIM compares around a pixel
-    reaches five pixels to each side, so a tile of 24 tells the SSIM of 14 x 14 pixels.
+    The volume is sampled as ``medium`` says: as it was when the VDIs were generated, but for the
+    lights, which are those of the view that is judged. An estimate takes 16 tiles of 24 pixels
+    along each edge; what SSIM compares around a pixel reaches five pixels to each side, so a tile
+    tells the SSIM of 14 x 14 pixels.
 
     The picture is cut into cells as large as what a tile tells, inside the rectangle around the
     bounds (elsewhere both pictures are empty, and SSIM is 1). Both pictures are rendered at a
@@ -89,15 +86,11 @@ class ViewErrorEstimator:
         transfer_function: TransferFunction,
         medium: MediumOptions | None = None,
         *,
-        tiles: int = TILES,
-        tile_size: int = TILE_SIZE,
         device: Any = None,
-        **changes: Any,
     ) -> None:
-        options = MediumOptions.of(medium, changes)
-        self._tiles, self._edge = tiles, tile_size - 2 * REACH
+        options = medium or MediumOptions()
         self._runtime = get_runtime(device)
-        edge = max(tile_size, math.isqrt(2 * _COARSE_LAUNCH))  # of what is rendered at a time
+        edge = max(TILE_SIZE, math.isqrt(2 * _COARSE_LAUNCH))  # of what is rendered at a time
         room = picture_room((edge, edge), options.memory_limit)
         self._medium = DeviceVolume(self._runtime, volume, transfer_function, options, room=room)
 
@@ -119,15 +112,14 @@ class ViewErrorEstimator:
         camera = Camera.from_any(camera)
         size = check_window_size(vdi.window_size if window_size is None else window_size)
         request = FrameRequest(camera, size, options or RenderOptions(), device=self._runtime)
-        where = (angle_from_generating_view(vdi, camera), magnification(vdi, camera, size))
         if min(size) < SSIM_WINDOW:
-            return ViewError(math.nan, *where, 0)
+            return ViewError(math.nan, 0)
         sample = self.sample(vdi, request, background)
         if sample is None:
-            return ViewError(1.0, *where, 0)
+            return ViewError(1.0, 0)
         old, new = self.tiles(sample, request, vdi), self.tiles(sample, request)
         ssim = sample.infer(tiles_ssim(old, new, background))
-        return ViewError(ssim, *where, len(new))
+        return ViewError(ssim, len(new))
 
     def sample(
         self, vdi: VDI, request: FrameRequest, background: Sequence[float] = (0.0, 0.0, 0.0)
@@ -141,10 +133,10 @@ class ViewErrorEstimator:
         region = seen_region(camera, size, (vdi.bounds, self._medium.volume.bounds))
         if region is None:
             return None
-        cells = Cells(*region, size, self._edge)
+        cells = Cells(*region, size, TILE_SIZE - 2 * REACH)
         n = len(cells.corners)
-        if n <= self._tiles:
-            return cells.sample(np.ones(n), self._tiles)
+        if n <= TILES:
+            return cells.sample(np.ones(n), TILES)
         # Draw coarse pictures of the region both ways, in bands
         (left, top), extents = region
         columns, rows = (-(-extent // COARSE) for extent in extents)
@@ -158,7 +150,7 @@ class ViewErrorEstimator:
             pictures[0].append(render_vdi(vdi, part))
             pictures[1].append(raycast_medium(self._medium, part))
         old, new = (over_background(np.concatenate(each), background) for each in pictures)
-        return cells.sample(cells.guess(old, new), self._tiles)
+        return cells.sample(cells.guess(old, new), TILES)
 
     def tiles(
         self, sample: TileSample, request: FrameRequest, vdi: VDI | None = None

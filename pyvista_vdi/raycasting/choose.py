@@ -14,7 +14,7 @@ _RAYCAST = "raycasting/raycast.cl", "raycast"
 
 
 @dataclass(frozen=True)
-class Variant:
+class ChosenKernel:
     """A kernel that draws a scene, by its file and name, and how it is launched.
 
     ``switches`` are its ``-D`` options, eight at most. ``items`` are its work-items, each of which
@@ -32,7 +32,7 @@ class Variant:
     whole: bool = False
 
 
-def choose(device: Runtime, scene: Scene) -> Variant:
+def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     """Return the variant that draws a scene on a device: of the first row that fits.
 
     ==========  =====================================================  ========================
@@ -64,7 +64,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         switches = {**lists, **sums}
         counts = {"counts": prepared.occupancy.counts, "samples": options.preview_samples}
         items = block_items(*scene.size)
-        return Variant(
+        return ChosenKernel(
             ("raycasting/preview.cl", "preview"), switches, items, GROUP, counts, whole=True
         )
 
@@ -72,18 +72,18 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     if scene.segments:
         lanes = LANES if device.is_cpu and suit_blocks else 1
         switches = {**lists, "LANES": lanes}
-        return Variant(
+        return ChosenKernel(
             ("multi_vdi/segments.cl", "segments"), switches, 0, GROUP // lanes, {}, lanes
         )
 
     def by_columns(
         kernel: tuple[str, str], switches: Mapping[str, int | str], rays: int = 1, **own: Any
-    ) -> Variant:
+    ) -> ChosenKernel:
         """Return the variant that draws the scene's part in strips, column by column."""
         columns = part_columns(scene.part)
         items = COLUMN_ITEMS * int(columns[2]) * int(columns[3])
         own = {"part": columns, **own}
-        return Variant(kernel, switches, items // rays, COLUMN_ITEMS // rays, own, rays)
+        return ChosenKernel(kernel, switches, items // rays, COLUMN_ITEMS // rays, own, rays)
 
     if scene.hit is not None:
         return by_columns(
@@ -101,7 +101,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         kernel = "raycasting/aligned_view.cl", "raycast_aligned_view"
         own = {"origin": scene.aligned.origin}
         items = scene.aligned.items
-        return Variant(kernel, {**lists, **sums}, items, LANES, own, LANES, whole=True)
+        return ChosenKernel(kernel, {**lists, **sums}, items, LANES, own, LANES, whole=True)
     # Each ray is still in one list: the kernel for single rays has a loop along it. Cropped rays
     # are followed in blocks where they can be
     if scene.one_list and not (cropped and in_blocks):
@@ -113,7 +113,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         switches = {**lists, **sums}
         across: dict[str, Any] = {"epipole": packets.epipole, "part": packets.part}
         across |= {"upright": packets.upright, "sweep_v": packets.sweep_v}
-        return Variant(
+        return ChosenKernel(
             ("raycasting/packets.cl", "raycast_packets"),
             switches,
             packets.items,
@@ -126,9 +126,9 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     return by_columns(_RAYCAST, switches, lanes)
 
 
-def choose_merge(device: Runtime, scenes: Sequence[Scene]) -> Variant:
+def choose_merge(device: Runtime, scenes: Sequence[Scene]) -> ChosenKernel:
     """Return the variant that merges what rays cross of several VDIs."""
     compensated = summation(sum(scene.prepared.most_media for scene in scenes))
     lanes = LANES if device.is_cpu and compensated < 2 else 1
     switches = {"STREAMS": len(scenes), "COMPENSATED": compensated, "LANES": lanes}
-    return Variant(("multi_vdi/merge.cl", "merge"), switches, 0, GROUP // lanes, {}, lanes)
+    return ChosenKernel(("multi_vdi/merge.cl", "merge"), switches, 0, GROUP // lanes, {}, lanes)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device.constants import BLOCK_RAYS, STEEPEST
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.classify_values import Media
 from pyvista_vdi.model.ray_forms import Rectangle, inverse_affine
 from pyvista_vdi.model.vdi import VDI
 
@@ -104,23 +105,23 @@ def share_lit(
     vdi: VDI,
     near: float,
     far: float,
-    optical_depths: Callable[[NDArray[np.int64]], NDArray[np.float32]] | None = None,
+    media_of: Callable[[NDArray[np.int64]], Media] | None = None,
 ) -> float:
     """Return how much of the depths from ``near`` to ``far`` light gets through, the lists' mean.
 
     Of some of the lists that are not empty; 1 in a list through which it gets. View depths of V_O.
-    ``optical_depths``: those of some supersegments, where others are shown than the VDI's.
+    ``media_of``: those of some supersegments, where others are shown than the VDI's.
     """
     offsets = vdi.offsets.view(np.int64)
     lists = np.flatnonzero(np.diff(offsets))
-    sampled = _SAMPLED_LISTS if optical_depths is None else _SAMPLED_LISTS_OF_VALUES
+    sampled = _SAMPLED_LISTS if media_of is None else _SAMPLED_LISTS_OF_VALUES
     lists = lists[:: -(-len(lists) // sampled) or 1]
     if not len(lists):
         return 1.0
     counts = offsets[lists + 1] - offsets[lists]
     begins = np.cumsum(counts) - counts
     places = np.arange(counts.sum()) + np.repeat(offsets[lists] - begins, counts)
-    optical_depth = vdi.optical_depth[places] if optical_depths is None else optical_depths(places)
+    optical_depth = vdi.optical_depth[places] if media_of is None else media_of(places)[1]
     optical_depth = optical_depth.astype(np.float64)
     before = np.cumsum(optical_depth) - optical_depth
     before -= np.repeat(before[begins], counts)
@@ -130,7 +131,7 @@ def share_lit(
     depth = front + np.minimum(left, 1.0) * (back - front) + vdi.depth_origin
     through = np.add.reduceat(optical_depth, begins) < _DARK
     shares = np.where(through, 1.0, (depth - near) / max(far - near, np.finfo(np.float64).tiny))
-    if optical_depths is not None:  # lists of which nothing is shown are empty
+    if media_of is not None:  # lists of which nothing is shown are empty
         shares = shares[np.add.reduceat(optical_depth, begins) > 0]
     return float(np.clip(shares, 0.0, 1.0).mean()) if len(shares) else 1.0
 

@@ -20,7 +20,7 @@ from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag, as_float, as_range
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -120,8 +120,6 @@ def pick_vdi(
     The request's ``opaque_depth`` is that of this ray, a number. ``deferred``: what the VDI
     was classified from.
     """
-    if not isinstance(vdi, VDI):
-        raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
     camera, options = request.camera, request.options
     (x, y), (width, height) = as_range(pixel), request.size
     if not (-0.5 <= x < width - 0.5 and -0.5 <= y < height - 0.5):
@@ -197,11 +195,9 @@ class _Ray:
 
     def span(self, vdi: VDI, request: FrameRequest) -> tuple[float, float] | None:
         """Return first and last t where there may be a medium; ``None`` where there is none."""
-        forms = rays.box_planes(self.window, vdi.bounds)
-        forms += rays.eye_plane(request.camera, self.window)
         planes = request.options.clipping_planes
-        forms += rays.user_planes(request.camera, self.window, planes)
-        table = np.asarray(forms)
+        of_view = rays.view_planes(request.camera, self.window, planes)
+        table = np.asarray(rays.box_planes(self.window, vdi.bounds) + of_view)
         (u, v, depth, d), (du, dv, ddepth, dd) = self.at, self.slope
         value = [*(table[:, :3] @ self.pixel), d + u, d - u, d + v, d - v]
         slope = [*(table[:, 3:] @ self.pixel), dd + du, dd - du, dd + dv, dd - dv]

@@ -18,7 +18,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classify_values import CELLS, ValuesLook
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.float32_limits import lists_are_far
-from pyvista_vdi.model.vdi import VDI, with_arrays
+from pyvista_vdi.model.vdi import VDI, made_vdi
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.packets import share_lit
 from pyvista_vdi.volume.upload import release_voxels
@@ -399,7 +399,7 @@ class KeptValues(PreparedVDI):
 
     def __init__(self, runtime: Runtime, deferred: DeferredVDI) -> None:
         arrays = {"means": deferred.mean, "spreads": deferred.spread, "steps": deferred.steps}
-        self._lists = with_arrays(deferred, deferred.arrays)
+        self._lists = made_vdi(deferred.arrays, deferred)
         with kept_together() as keep:
             #: Means, spreads and steps of the supersegments.
             self.values = {
@@ -421,10 +421,10 @@ class KeptValues(PreparedVDI):
         """Return what a transfer function shows: what is transparent is left out."""
         runtime, shown, bundles = self.runtime, copy.copy(self), self.headers.shape[0]
         if runtime.is_cpu:
-            shown.lit = share_lit(self._lists, *self.depths, lambda rows: look.media_of(rows)[1])
+            shown.lit = share_lit(self._lists, *self.depths, partial(look.media_of, look))
         with (
             kept_together() as keep,
-            runtime.upload(look.integrals(), "integrals of a transfer function") as table,
+            runtime.upload(look.integrals, "integrals of a transfer function") as table,
         ):
             shown.headers = keep(runtime.result((bundles,), np.uint64, "list headers"))
             media = {**self.values, "integrals": table, "cells": CELLS}

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, get_runtime, padded
-from pyvista_vdi.errors import InvalidArgumentError
+from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.model.ray_forms import reference_depth
-from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose
 from pyvista_vdi.raycasting.picking import FirstHit
@@ -26,11 +25,9 @@ def render_vdi(vdi: VDI, request: FrameRequest) -> NDArray[np.float32]:
     device and kept as long as the object lives.
     """
     runtime = get_runtime(request.device)
-    prepared = prepared_vdi(runtime, checked_vdi(vdi))
+    prepared = prepared_vdi(runtime, vdi)
     shape, out = (*request.size[::-1], 4), request.out
-    with (
-        runtime.result(shape, name="image") if out is None else runtime.target(out, "image")
-    ) as image:
+    with runtime.result(shape, name="image", out=out) as image:
         draw(prepared, request, image)
         return runtime.download(image, out)
 
@@ -41,18 +38,11 @@ def render_first_hits(vdi: VDI, request: FrameRequest, hit: FirstHit) -> NDArray
     float32 (height, width), world units, top row first; infinite where nothing is hit.
     """
     runtime = get_runtime(request.device)
-    prepared = prepared_vdi(runtime, checked_vdi(vdi))
+    prepared = prepared_vdi(runtime, vdi)
     with runtime.buffer(request.size[::-1], name="depth of first hits") as image:
         draw(prepared, request, image, hit)
         t = runtime.download(image)
     return (t + reference_depth(request.camera, vdi.bounds)).astype(np.float32)
-
-
-def checked_vdi(vdi: Any) -> VDI:
-    """Return a VDI; anything else is refused."""
-    if not isinstance(vdi, VDI):
-        raise InvalidArgumentError(f"expected a VDI, got {type(vdi).__name__}")
-    return vdi
 
 
 def draw(

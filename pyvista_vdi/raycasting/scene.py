@@ -15,8 +15,8 @@ from pyvista_vdi.device import DeviceBuffer
 from pyvista_vdi.device.constants import BUNDLE, PLANE_FORMS
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.options import FrameRequest, RenderOptions
 from pyvista_vdi.model.ray_forms import Rectangle
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.raycasting.packets import LANES, Packets, packets_of
 from pyvista_vdi.raycasting.picking import FirstHit
 from pyvista_vdi.raycasting.prepared import PreparedVDI
@@ -131,17 +131,16 @@ class Scene:
         planes = [
             *rays.box_planes(pixel_rays, prepared.bounds),
             *_viewport_planes(prepared, coordinates),
-            *rays.eye_plane(camera, pixel_rays),
-            *rays.user_planes(camera, pixel_rays, options.clipping_planes),
+            *rays.view_planes(camera, pixel_rays, options.clipping_planes),
             *cropped.planes,
         ]
-        pack = rays.packed_double_float if prepared.double_float else rays.packed
+        forms = [*coordinates, *direction, *planes, *cropped.forms]
         return cls(
             prepared,
             camera,
             size,
             options,
-            pack([*coordinates, *direction, *planes, *cropped.forms]),
+            rays.packed(forms, prepared.double_float),
             len(planes),
             rays.checked_opaque_depth(request.opaque_depth, size, pixel_rays),
             pixel_rays.reference_depth,

@@ -82,7 +82,7 @@ class DeviceVolume:
         room: Room | None = None,
         **changes: Any,
     ) -> None:
-        options = MediumOptions.of(options, changes)
+        options = replace(options or MediumOptions(), **changes)
         if not isinstance(volume, Volume):
             raise InvalidArgumentError(f"expected a Volume, got {type(volume).__name__}")
         if not isinstance(transfer_function, TransferFunction):
@@ -277,7 +277,6 @@ def _media_of_scalars(runtime: Runtime, table: _Table, first: int, last: int) ->
         )
         numbers = {"entries": table.entries, "low": table.low, "per_scalar": table.per_scalar}
         launch(padded(n, GROUP), GROUP, **numbers, first=first, count=n)
-        runtime.finish()  # the table may be host memory in use
     return _Table(media, n, float(first), 1.0, by_scalar=True)
 
 
@@ -336,7 +335,6 @@ def _visibility(
             visible=visible,
         )
         launch(padded(n, GROUP), GROUP)
-        runtime.finish()  # the table above may be host memory in use
     return visible
 
 
@@ -362,7 +360,6 @@ def _distances(
             distances = runtime.buffer((seen.size,), np.uint8, "distances of macrocells")
             group = padded(seen.size, GROUP), GROUP
             launch(*group, before=before, apart=apart, along=along, distances=distances)
-            runtime.finish()  # what was read is released
         apart *= along
     return distances
 

@@ -15,9 +15,9 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
-from pyvista_vdi.model.float32_limits import MOST_STEPS, enters_far_away
-from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed, packed_double_float
-from pyvista_vdi.model.render_options import Planes
+from pyvista_vdi.model.float32_limits import ENTRY_PER_POINT, FAR_ENTRY, MOST_STEPS, NEAR_ENTRY
+from pyvista_vdi.model.options import Planes
+from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed
 from pyvista_vdi.model.volume import Grid
 
 Ends = tuple[float, float, float]
@@ -58,8 +58,7 @@ class MarchForms:
 
     def packed(self, *more: Floats) -> NDArray[np.float32]:
         """Return the forms, and more of the same rays, as the kernels read them."""
-        pack = packed_double_float if self.double_float else packed
-        return pack([*self.forms, *more])
+        return packed([*self.forms, *more], self.double_float)
 
 
 @dataclass(frozen=True)
@@ -75,18 +74,17 @@ class GridRays:
     ) -> MarchForms:
         """Return what the kernels march along in a view."""
         pixel_rays = rays.pixel_rays(camera, window_size, self.grid.bounds)
-        to_index = rays.inverse_affine(self.grid.index_to_model)
+        to_index, points = rays.inverse_affine(self.grid.index_to_model), self.grid.dimensions
         index = [pixel_rays.form(row[:3], row[3]) for row in to_index[:3]]
         direction = [pixel_rays.form(axis) for axis in np.eye(3)]
         planes = []
-        for form, points in zip(index, self.grid.dimensions, strict=True):
+        for form, n in zip(index, points, strict=True):
             far = -form
-            far[0] += points - 1
+            far[0] += n - 1
             planes += [form, far]
-        planes += rays.eye_plane(camera, pixel_rays)
-        planes += rays.user_planes(camera, pixel_rays, clipping_planes)
+        planes += rays.view_planes(camera, pixel_rays, clipping_planes)
         reach = rays.largest_value(camera, window_size, self.grid.bounds, index)
-        two_floats = enters_far_away(reach, max(self.grid.dimensions))
+        two_floats = reach > min(max(NEAR_ENTRY, ENTRY_PER_POINT * max(points)), FAR_ENTRY)
         return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), two_floats)
 
     def view(

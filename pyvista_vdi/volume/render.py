@@ -12,8 +12,7 @@ from pyvista_vdi.device import DeviceBuffer, Runtime, get_runtime
 from pyvista_vdi.device.constants import block_items
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.options import MediumOptions
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest, MediumOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import SAMPLE_BYTES, Room, StepSampler

@@ -12,11 +12,12 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime, aligned_empty, kept_together, padded
+from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together, padded
 from pyvista_vdi.device.constants import GROUP, MACROCELL_SHIFT
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import LARGEST_POWER, LARGEST_VOXEL, scalars_suit_float32
+from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.lighting import Light, Lights, Shading
 from pyvista_vdi.model.transfer_function import GRADIENT_SHARE, TransferFunction
 from pyvista_vdi.model.volume import Grid, Volume

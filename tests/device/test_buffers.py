@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pyvista_vdi import device as ocl
 from pyvista_vdi.device import devices
 from pyvista_vdi.errors import DeviceError, DeviceMemoryError
+from pyvista_vdi.model.host_memory import aligned_empty
 
 DTYPES = ["u1", "i2", "f8"]
 
@@ -18,11 +18,13 @@ DTYPES = ["u1", "i2", "f8"]
 @pytest.mark.parametrize("aligned", [True, False])
 def test_upload_and_download(runtime, aligned):
     """Aligned arrays are used in place on a CPU."""
-    values = np.random.default_rng(7).integers(0, 120, (5, 3, 4))
+    values = np.random.default_rng(7).integers(0, 120, (50, 30, 64))
     gc.collect()
     before = runtime.allocated
     for dtype in DTYPES:
-        array = ocl.aligned_empty((5, 3, 4), dtype) if aligned else np.empty((5, 3, 4), dtype)[::-1]
+        array = (
+            aligned_empty((50, 30, 64), dtype) if aligned else np.empty((50, 30, 64), dtype)[::-1]
+        )
         assert array.ctypes.data % 4096 == 0 or not aligned
         array[...] = values
         with runtime.upload(array, name="values") as buffer:
@@ -30,7 +32,7 @@ def test_upload_and_download(runtime, aligned):
                 assert runtime.allocated - before == (0 if runtime.is_cpu else array.nbytes)
             del array
             back = runtime.download(buffer)
-            assert (back.dtype, back.shape) == (np.dtype(dtype), (5, 3, 4))
+            assert (back.dtype, back.shape) == (np.dtype(dtype), (50, 30, 64))
             np.testing.assert_array_equal(back, values)
             np.testing.assert_array_equal(
                 runtime.download(buffer, np.empty(7, dtype)), values.ravel()[:7]
@@ -61,11 +63,11 @@ def test_results_outlive_their_buffers(runtime, shape):
 @pytest.mark.parametrize("aligned", [True, False])
 def test_a_target_gets_what_kernels_write(runtime, aligned):
     values = np.arange(1, 2001, dtype=np.float32).reshape(40, 50)
-    array = ocl.aligned_empty((40, 50), np.float32) if aligned else np.empty(2001, np.float32)[1:]
+    array = aligned_empty((40, 50), np.float32) if aligned else np.empty(2001, np.float32)[1:]
     array = array.reshape(40, 50)
     array[...] = -1
     before = runtime.allocated
-    with runtime.target(array, "values") as buffer:
+    with runtime.result(array.shape, name="values", out=array) as buffer:
         in_place = runtime.is_cpu and aligned
         assert (buffer.host is array) == in_place
         assert runtime.allocated - before == (0 if in_place else array.nbytes)
@@ -95,7 +97,7 @@ def test_too_large_a_buffer_is_refused_before_it_is_taken(small):
         small.buffer((3 * 2**17,), name="colours")
     assert isinstance(caught.value, MemoryError)
     assert "max_supersegments" in str(caught.value)
-    for array in (np.zeros(2**19), ocl.aligned_empty(2**19, np.float64)):
+    for array in (np.zeros(2**19), aligned_empty(2**19, np.float64)):
         with pytest.raises(DeviceMemoryError, match="'volume' needs 4.00 MiB"):
             small.upload(array, name="volume")
     with small.buffer((2**18,), name="one"), small.buffer((2**18 - 1,), name="two"):

@@ -8,7 +8,7 @@ import pytest
 from fresh_python import run_python
 
 from pyvista_vdi import device as ocl
-from pyvista_vdi.device import choice, devices, icd
+from pyvista_vdi.device import choice, devices
 from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError
 
 
@@ -79,27 +79,21 @@ def test_every_form_of_device_gives_the_same_runtime(runtime):
     assert runtime.info.full_name in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("where", "column"), [("", 0), ("functions", 3), ("local memory", 0), ("atomic functions", 0)]
-)
-def test_probe_notices_wrong_numbers(runtime, monkeypatch, where, column):
+@pytest.mark.parametrize("where", ["", "probe values", "probe sums", "probe total"])
+def test_probe_notices_wrong_numbers(runtime, monkeypatch, where):
     download = type(runtime).download
 
     def wrong(self, buffer):
         values = download(self, buffer)
-        if (buffer.name, where) == ("probe sums", "local memory"):
-            values[1] += 1
-        elif (buffer.name, where) == ("probe total", "atomic functions"):
-            values[0] -= 1
-        elif (buffer.name, where) == ("probe values", "functions"):
-            values[7, column] *= 1.00001
+        if buffer.name == where == "probe values":
+            values[7, 3] *= 1.00001
+        elif buffer.name == where:
+            values[0] += 1
         return values
 
     # Of the class: taken back on the runtime, a method would stay there as an attribute
     monkeypatch.setattr(type(runtime), "download", wrong)
-    found = choice.run_probe(runtime)
-    assert where in found
-    assert bool(found) == bool(where)
+    assert bool(choice.run_probe(runtime)) == bool(where)
 
 
 def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
@@ -115,7 +109,5 @@ def test_no_device_says_what_was_found_and_the_remedy(tmp_path):
     described, message = done.stdout.split("caught ")
     for text in (described, message):
         assert "no usable OpenCL device" in text
-        installed = icd.intel_library() is not None
-        assert ('pip install "pyvista-vdi[cpu]"' in text) != installed
-        assert ("pocl-opencl-icd" in text) != installed
-        assert ("unset OCL_ICD_VENDORS" in text) == installed
+        assert 'pip install "pyvista-vdi[cpu]"' in text
+        assert "unset OCL_ICD_VENDORS" in text

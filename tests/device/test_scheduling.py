@@ -9,10 +9,10 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from pyvista_vdi import device as ocl
 from pyvista_vdi.device import scheduling as turns
 from pyvista_vdi.device.scheduling import Turns
 from pyvista_vdi.errors import Cancelled
+from pyvista_vdi.model.host_memory import aligned_empty
 
 #: Seconds after which a test that waits for another thread gives up: it would wait for ever.
 PATIENCE = 120
@@ -200,7 +200,7 @@ def test_no_kernel_asks_for_its_groups_number():
 def test_copies_in_pieces(runtime):
     rng = np.random.default_rng(3)
     array = rng.integers(0, 2**32, (11, 70, 3001), dtype=np.uint32)  # 9 MB: three pieces
-    unaligned = ocl.aligned_empty(array.size + 1, np.uint32)[1:].reshape(array.shape)
+    unaligned = aligned_empty(array.size + 1, np.uint32)[1:].reshape(array.shape)
     unaligned[...] = array
     before = runtime.allocated
     with (

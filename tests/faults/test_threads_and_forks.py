@@ -77,14 +77,15 @@ def test_one_vdi_drawn_by_many_threads(runtime):
 
 FORK = """
 import gc, os
-from pyvista_vdi.device import aligned_empty, list_devices
+from pyvista_vdi.device import list_devices
+from pyvista_vdi.model.host_memory import aligned_empty
 from drawing import render_vdi
 
 runtime = get_runtime(sys.argv[1])
 volume = fresh_volume()
 vdi = generate_vdi(volume, CAMERA, WINDOW, TRANSFER, device=runtime)
 image = render_vdi(vdi, CAMERA, device=runtime)
-in_place = runtime.upload(aligned_empty((64, 64), np.float32))
+in_place = runtime.upload(aligned_empty((256, 256), np.float32))
 
 def child():
     said = []

@@ -9,10 +9,7 @@ from settings import with_settings
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.generation.deferred import generate_deferred
-from pyvista_vdi.model.classify_values import classify
-from pyvista_vdi.model.deferred import lengths_of
 from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
-from pyvista_vdi.raycasting.classified_values import classify_on_device
 
 EDGES = NX, NY, NZ = 7, 6, 33
 #: Lengths of a column's voxels: the first and the last reach half as far into the grid.
@@ -79,25 +76,6 @@ def test_what_is_outside_the_range_ends_a_supersegment_and_is_no_part_of_it(runt
         assert one.spread[rows] == 0
 
 
-@pytest.mark.parametrize("seed", [1, 3])
-def test_the_device_classifies_as_float64_does(runtime, seed):
-    rng = np.random.default_rng(seed)
-    array = rng.random(EDGES[::-1]).astype(np.float32)
-    deferred = kept(runtime, array, (0, 1), max_supersegments=[60, 6, 3, 1][seed])
-    opacities = np.where(rng.random(40) < 0.3, 0, rng.random(40) ** [8, 3, 1, 0][seed])
-    looks = pvdi.TransferFunction(rng.random((40, 3)), opacities, (0, 1))
-    found, wanted = classify_on_device(deferred, looks, runtime), classify(deferred, looks)
-    # What next to nothing is seen of may be nothing on the device, whose table has steps of 2^-40
-    some, those = found.optical_depth > 1e-6, wanted.optical_depth > 1e-6
-    assert np.array_equal(found.front[some], wanted.front[those])
-    assert found.color[some] == pytest.approx(wanted.color[those], abs=5e-5)
-    # Of an opacity of a step of nearly 1 float32 holds less; what is behind it is not seen
-    dense = 8 * lengths_of(wanted)[those] / deferred.sample_distance
-    tau, exact = found.optical_depth[some], wanted.optical_depth[those]
-    assert tau[exact <= dense] == pytest.approx(exact[exact <= dense], rel=2e-4)
-    assert (tau[exact > dense] >= 0.9 * dense[exact > dense]).all()
-
-
 def test_generate_returns_one_and_bakes_by_default(runtime):
     volume, camera = columns(np.random.default_rng(8).random(EDGES[::-1]).astype(np.float32))
     asked = {"device": runtime, "max_supersegments": 5}
@@ -118,7 +96,7 @@ def test_generate_returns_one_and_bakes_by_default(runtime):
     ("asked", "error", "says"),
     [
         ({"cmap": "bone"}, InvalidArgumentError, "give cmap to classified"),
-        ({"shade": True}, UnsupportedError, "shade"),
+        ({"shade": True}, InvalidArgumentError, "shade"),
         ({"ambient_occlusion": True}, UnsupportedError, "ambient_occlusion"),
         ({"quality": "fast"}, UnsupportedError, "give max_supersegments"),
         ({"blending": "maximum"}, UnsupportedError, "blending"),

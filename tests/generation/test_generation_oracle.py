@@ -24,9 +24,10 @@ from reference.raycast import NEAR_LIMIT
 from sampling_uncertainty import uncertainties
 
 from pyvista_vdi import Camera, Cancelled
+from pyvista_vdi.model.chunked import VOXEL_TYPES
 from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
+from pyvista_vdi.model.volume import Volume
 
 WINDOW = (14, 10)
 

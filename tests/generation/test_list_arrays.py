@@ -10,7 +10,8 @@ from drawing import generate_vdi
 from faulty_driver import CAMERA, TRANSFER, WINDOW, fresh_volume
 
 from pyvista_vdi import Camera, render
-from pyvista_vdi.device import GrowingArray, Runtime
+from pyvista_vdi.device import Runtime
+from pyvista_vdi.model.host_memory import GrowingArray
 
 #: Looks past the volume, so that first all and then no lists have something in them.
 HALF_BESIDE = Camera((3.5, -4.0, 30), (3.5, -4.0, 3.5), (0, 1, 0))

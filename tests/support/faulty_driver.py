@@ -16,7 +16,7 @@ from pyvista_vdi.raycasting.prepared import prepared_vdi
 #: The driver's functions that the runtime calls, by what they are for.
 ALLOCATIONS = ("Buffer",)
 LAUNCHES = ("enqueue_nd_range_kernel", "enqueue_copy", "enqueue_fill_buffer")
-WAITS = ("finish",)
+WAITS = ("finish", "enqueue_map_buffer")
 
 WINDOW = (24, 17)
 CAMERA = Camera((3.5, 3.5, 30), (3.5, 3.5, 3.5), (0, 1, 0))
@@ -68,7 +68,7 @@ class Driver:
         self._fail_at = None
         self._error = None
         self._names = ()
-        for name in (*ALLOCATIONS, *LAUNCHES):
+        for name in (*ALLOCATIONS, *LAUNCHES, "enqueue_map_buffer"):
             monkeypatch.setattr(self._cl, name, self._wrapped(name, getattr(self._cl, name)))
         queue = self._cl.CommandQueue
         monkeypatch.setattr(queue, "finish", self._wrapped("finish", queue.finish))
@@ -186,7 +186,7 @@ DeviceBuffer.__init__ = _noted
 def state_of(runtime):
     """What must be as before when something went wrong: buffers, memory."""
     gc.collect()
-    living = sorted((buffer.name, buffer.nbytes) for buffer in _BUFFERS if not buffer.released)
+    living = sorted((buffer.name, buffer.nbytes) for buffer in _BUFFERS if buffer.memory)
     return living, runtime.allocated
 
 

@@ -13,10 +13,11 @@ import numpy as np
 from hypothesis import strategies as st
 
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.chunked import VOXEL_TYPES
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.model.volume import VOXEL_TYPES, Volume
+from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting import packets
 
 #: Views of a VDI that :func:`random_view` draws; the hard ones by name.

@@ -71,7 +71,7 @@ def no_estimates(monkeypatch):
 
         def estimate(self, *_, **__):
             answer.asked += 1
-            return ViewError(answer.ssim, 0.0, 1.0, 1)
+            return ViewError(answer.ssim, 1)
 
     monkeypatch.setattr(planner, "ViewErrorEstimator", Estimator)
     return answer

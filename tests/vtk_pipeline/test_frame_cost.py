@@ -55,7 +55,9 @@ def test_depths_in_float32_are_as_exact_as_float32(parallel, near):
     u, far, camera = 2.0**-24, 10.0, pv.Camera()
     camera.clipping_range, camera.parallel_projection = (near, far), parallel
     rows = pv.array_from_vtkmatrix(camera.GetProjectionTransformMatrix(1.0, -1, 1))[2:]
-    frame = Frame((1, 1), (0, 0), Camera((0, 0, 0), (0, 0, -1), (0, 1, 0)), np.eye(4), rows)
+    frame = Frame(
+        (1, 1), (0, 0), Camera((0, 0, 0), (0, 0, -1), (0, 1, 0)), np.eye(4), rows, *[None] * 7
+    )
     z = np.r_[0, np.random.default_rng(1).beta(9, 1, 999), 1 - u].astype(np.float32)
     ours, exact = frame.view_depth(z), z.astype(np.float64) * (far - near)
     exact = near + exact if parallel else near * far / (far - exact)

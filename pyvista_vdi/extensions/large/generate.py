@@ -18,9 +18,8 @@ from pyvista_vdi.errors import (
     MissingDependencyError,
 )
 from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, cuts_of
-from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task
+from pyvista_vdi.extensions.large.passes import BlockSummary, Piece, Rows, Task
 from pyvista_vdi.generation.generate import made_from, report
-from pyvista_vdi.generation.list_arrays import require_room
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.packing import Arrays
 from pyvista_vdi.model.types import ClientLike
@@ -46,7 +45,6 @@ def generate_in_blocks(
     chunk.
     """
     volume, limit = request.volume, request.options.memory_limit
-    require_room(0, request.window_size)
     if limit is not None:
         block_bytes = min(block_bytes, limit // _BLOCKS_IN_LIMIT)
     array: Any = volume.array
@@ -91,7 +89,7 @@ def _generated(request: GenerationRequest, task: Task, workers: Any) -> VDI:
     order = task.to_read(windows)
     values = dict(zip(order, workers.values(map(blocks.own, order)), strict=True))
     first = workers.map("first-pass", task.first_pass, order, order, values.values(), share=0.4)
-    seen = workers.results(workers.map("seen", Seen.without_faces, order, first.values()))
+    seen = workers.results(workers.map("seen", BlockSummary.without_faces, order, first.values()))
     entering = task.light_entering(windows, seen)
 
     # Make the lists of each block in which something may be seen
@@ -129,10 +127,10 @@ def vdi_of(task: Task, request: GenerationRequest, rows: Sequence[Rows], device_
     asked = request.replace(transfer_function=task.transfer_function, options=task.options)
     made_by = made_from(asked, task.rays, device_name)
     return made_vdi(
-        task.camera,
-        task.size,
         Arrays(offsets, front, back, color, depth),
-        task.blocks.grid.bounds,
+        camera=task.camera,
+        window_size=task.size,
+        bounds=task.blocks.grid.bounds,
         depth_origin=task.rays.forms(task.camera, task.size).rays.reference_depth,
         metadata={**made_by, "blocks": list(task.blocks.counts), **request.metadata},
     ).with_precision(task.options.precision)

@@ -132,7 +132,6 @@ class SeriesInput(SeveralInput):
 
     def __init__(self, series: VDISeries, clock: Callable[[], float] = time.perf_counter) -> None:
         super().__init__(series, "pyvista-vdi series")
-        self.series = series
         self.device: Any = None
         #: Steps per second, and whether one is shown after the other.
         self.rate, self.playing = RATE, False
@@ -152,11 +151,11 @@ class SeriesInput(SeveralInput):
     @property
     def step(self) -> int:
         """Index of the step that is shown; negative ones that are set are from the end."""
-        return self._place % len(self.series)
+        return self._place % len(self.collection)
 
     @step.setter
     def step(self, step: int) -> None:
-        n = len(self.series)
+        n = len(self.collection)
         if not -n <= as_whole(step) < n:
             raise InvalidArgumentError(
                 f"step must be a whole number from {-n}, the first one, to {n - 1}; got {step!r}"
@@ -166,11 +165,11 @@ class SeriesInput(SeveralInput):
     @property
     def time(self) -> float:
         """Time of the step that is shown; of one that is set the nearest step is shown."""
-        return self.series.times[self.step]
+        return self.collection.times[self.step]
 
     @time.setter
     def time(self, time: float) -> None:
-        self.step = self.series.nearest(time)
+        self.step = self.collection.nearest(time)
 
     def vdi(self) -> VDI:
         """Return the step's VDI; of values what the property makes of them."""
@@ -190,7 +189,7 @@ class SeriesInput(SeveralInput):
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds of the step that was shown last, or of the first."""
-        return self.series.bounds if self._vdi is None else self._vdi.bounds
+        return self.collection.bounds if self._vdi is None else self._vdi.bounds
 
     def stamp(self) -> Any:
         """Return the step, and the time stamp of what classifies it."""
@@ -198,7 +197,7 @@ class SeriesInput(SeveralInput):
 
     def shared(self) -> Input:
         """Return an input that shows the same step, and plays by itself."""
-        other = SeriesInput(self.series)
+        other = SeriesInput(self.collection)
         other.step, other.prop = self.step, self.prop
         return other
 
@@ -209,10 +208,6 @@ class SeriesInput(SeveralInput):
     def watch(self, changed: Callable[..., Any] | None) -> None:
         """Call this when it begins to play; ``None`` ends it."""
         self._changed = changed
-
-    def complaint(self, error: BaseException) -> str:
-        """Return that a step is left out."""
-        return f"a step is left out: {type(error).__name__}: {error}"
 
     def play(
         self, rate: float = RATE, *, loop: bool = True, memory_limit: int | None = None
@@ -229,7 +224,7 @@ class SeriesInput(SeveralInput):
         self.memory = MediumOptions(memory_limit=memory_limit).memory_limit or self.memory
         self.rate, self._loop = as_float(rate), bool(loop)
         self.period = period_of(self.rate)
-        last = len(self.series) - 1
+        last = len(self.collection) - 1
         self._begin(0 if not loop and self.step == last else self.step)
         self.playing = last > 0
         if self._changed is not None:
@@ -243,7 +238,7 @@ class SeriesInput(SeveralInput):
         """Show the last step that is due and ready; whether it is another one."""
         if not self.playing:
             return False
-        now, n = self._clock(), len(self.series)
+        now, n = self._clock(), len(self.collection)
         self._since = now if self._since is None else self._since
         due = self._due_at(now)
         with self._lock:
@@ -278,14 +273,14 @@ class SeriesInput(SeveralInput):
         """Return the place whose time has come at a moment."""
         since = now if self._since is None else self._since
         place = self._from + int((now - since) * self.rate)
-        return place if self._loop else min(place, len(self.series) - 1)
+        return place if self._loop else min(place, len(self.collection) - 1)
 
     def _trim(self) -> None:
         """Drop what memory is not enough for, first what is shown in the longest time.
 
         In a round that does not fit, the same steps are kept in each.
         """
-        n = len(self.series)
+        n = len(self.collection)
         # A step may be shown although the next one is due already
         first = max(self._place, self._due_at(self._clock()) - 1) if self.playing else self._place
         last = sorted(self._ready, key=lambda step: (step != self.step, (step - first) % n))
@@ -294,7 +289,7 @@ class SeriesInput(SeveralInput):
             taken -= self._ready.pop(last.pop()).nbytes * (1 + ON_DEVICE)
 
     def _wanted(self) -> int | None:
-        n = len(self.series)
+        n = len(self.collection)
         if not self.playing:
             return None
         with self._lock:

@@ -120,7 +120,7 @@ def generate_set(
         begin = filling_camera(read.bounds, size) if camera is None else Camera.from_any(camera)
         axis = np.subtract(begin.position, world_centre(begin, read.bounds))
         cameras = orbit(begin, read.bounds, spread(int(as_whole(views)), axis, half_angle))
-    read = read.load_in_view(*cameras, window_size=size)
+    read = read.load(*cameras, window_size=size)
     table, done = looks.transfer_function_of(read), Pieces(progress, len(cameras))
     about = {"classification": looks.describe(), "scalars": read.name}
     edges = max(1, round(lists * size[0])), max(1, round(lists * size[1]))

@@ -81,7 +81,7 @@ class PlotterWidget(VDIWidget):
         player = None if self._actor is None else self._actor.player
         if player is None or change.new is None or self._shown() is None:
             return
-        if player.series.nearest(change.new) != player.step:
+        if player.collection.nearest(change.new) != player.step:
             player.time = change.new
             self._draw_later()
 

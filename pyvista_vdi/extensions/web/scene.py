@@ -79,8 +79,9 @@ def scene_of(plotter: Any, where: str | None, *, follow: bool = False) -> ShownS
     for prop in visible:
         missing: list[str] = []
         if is_vdi(prop):
-            matrix, several = as_array(prop.GetMatrix()), prop.collection
-            vdi = prop.vdi if follow else prop.GetMapper().driver.vdi_of_view(renderer, matrix)
+            matrix, several, mapper = as_array(prop.GetMatrix()), prop.collection, prop.GetMapper()
+            anew = mapper.GetSource() is not None and mapper.GetRegenerate() != "never"
+            vdi = prop.regenerate() if anew and not follow else prop.vdi
             if vdi is None:
                 continue
             placed: dict[str, Any] = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}

@@ -13,7 +13,7 @@ from pyvista_vdi.io.stores.record import Level, Store, StoredVolume
 from pyvista_vdi.io.stores.zarr import open_zarr
 from pyvista_vdi.model.whole_file import as_path
 
-__all__ = ["Level", "Store", "StoredVolume", "is_store", "names_in", "open_store", "store_at"]
+__all__ = ["Level", "Store", "StoredVolume", "is_store", "names_in", "store_at"]
 
 _HDF5 = (".h5", ".hdf5", ".he5")
 #: Metadata of a group or an array of zarr: a folder that has one belongs to a store.
@@ -28,16 +28,6 @@ def is_store(path: str | os.PathLike[str]) -> bool:
     return os.path.isdir(outer) and any(  # noqa: PTH112 - pathlib's raises for too long names
         (Path(outer) / name).is_file() for name in _ZARR_FILES
     )
-
-
-def open_store(
-    path: str | os.PathLike[str],
-    level: int | str = "auto",
-    time: int = 0,
-    channel: int | str = 0,
-) -> StoredVolume:
-    """Open a level of a store; the finest, unless one is asked for."""
-    return StoredVolume(store_at(path), level, time, channel)
 
 
 def store_at(path: str | os.PathLike[str]) -> Store:

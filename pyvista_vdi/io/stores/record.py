@@ -10,9 +10,9 @@ import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.chunked import closed, opened
+from pyvista_vdi.model.chunked import ChunkedArray, closed, opened
 from pyvista_vdi.model.view import required_level
-from pyvista_vdi.model.volume import Grid, Volume, chunked_array
+from pyvista_vdi.model.volume import Grid, Volume
 
 #: The axes of OME-Zarr, in their order.
 AXES = ("t", "c", "z", "y", "x")
@@ -130,7 +130,7 @@ class StoredVolume(Volume):
     """
 
     def __init__(
-        self, store: Store, level: int | str, time: int = 0, channel: int | str = 0
+        self, store: Store, level: int | str = "auto", time: int = 0, channel: int | str = 0
     ) -> None:
         count = len(store.levels)
         self.asked = not (isinstance(level, str) and level == "auto")
@@ -144,7 +144,7 @@ class StoredVolume(Volume):
         grid = chosen.grid
         number: Any = index[store.axes.index("c")] if "c" in store.axes else 0
         super().__init__(
-            chunked_array(chosen.array, index),
+            ChunkedArray(chosen.array, index=index),
             grid.spacing,
             grid.origin,
             grid.direction,

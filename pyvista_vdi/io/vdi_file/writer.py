@@ -32,7 +32,7 @@ from pyvista_vdi.io.vdi_file.layout import (
 )
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import DEPTH_CODES, Packed8
-from pyvista_vdi.model.vdi import VDI, length_per_depth, with_arrays
+from pyvista_vdi.model.vdi import VDI, length_per_depth, made_vdi
 from pyvista_vdi.model.whole_file import whole_file
 
 #: The oldest time that ZIP knows; a real one would make equal VDIs differ.
@@ -159,7 +159,7 @@ def coarser(vdi: VDI, step: int = 4) -> VDI:
     )
     tau = vdi.optical_depth[rows] * np.repeat(stretch.ravel(), counts)
     arrays = vdi.arrays.take(offsets, rows)._replace(optical_depth=tau.astype(np.float32))
-    return with_arrays(vdi, arrays, camera=camera, window_size=window, metadata={})
+    return made_vdi(arrays, vdi, camera=camera, window_size=window, metadata={})
 
 
 def stored(name: str) -> zipfile.ZipInfo:

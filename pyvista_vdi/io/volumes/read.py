@@ -16,7 +16,7 @@ from pyvista_vdi.errors import (
     UnsupportedError,
     VDIError,
 )
-from pyvista_vdi.io.stores import names_in, open_store, store_at
+from pyvista_vdi.io.stores import StoredVolume, names_in, store_at
 from pyvista_vdi.io.volumes.formats import VolumeFormat, format_of
 from pyvista_vdi.io.volumes.in_file import REMEDY, VolumeInFile, chosen, placed, volume_of
 from pyvista_vdi.model.volume import Volume
@@ -79,7 +79,7 @@ def read_volume(
         inside = f"{os.fspath(path)}::{asked}" if isinstance(asked, str) else path
         told: Any = {"level": level, "channel": channel, "time": time}
         told = {name: value for name, value in told.items() if value is not None}
-        return placed(open_store(inside, **told), spacing, origin)
+        return placed(StoredVolume(store_at(inside), **told), spacing, origin)
     if level not in (None, "auto", 0):
         raise UnsupportedError(f"{file} has no levels, as stores have: leave level={level!r} out")
     with _explained(file, kind):

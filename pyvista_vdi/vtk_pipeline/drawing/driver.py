@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVolumeError, VDIError
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.device import get_runtime
+from pyvista_vdi.errors import InvalidVolumeError, VDIError
+from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.model.view import coverage
 from pyvista_vdi.quality.plan import SETTLED
 from pyvista_vdi.quality.rate import FLOOR, reduced
@@ -33,7 +34,6 @@ from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.interaction.timer import PERIOD, Timer
 from pyvista_vdi.vtk_pipeline.interaction.window import Window, now
-from pyvista_vdi.vtk_pipeline.vtk import vtkWeakReference, weakly
 
 #: Pictures as coarse as previews that tell what a volume's rays take, of which the fastest counts:
 #: what disturbs one by milliseconds has the volume seem too slow to be drawn.
@@ -50,8 +50,6 @@ class Driver(Planner):
         super().__init__()
         self.box = Box()
         self._window: Callable[[], Window | None] = lambda: None  # of the last frame
-        self._active = vtkWeakReference()  # which renderer is between its start and its end
-        self._followed: list[Callable[[], Any]] = []  # renderers that say so
         self.trouble: BaseException | None = None  # why a frame could not be drawn, the last time
         # What the last frame showed, and by what
         self._last, self._spare = NOTHING, NOTHING.pixels
@@ -62,21 +60,6 @@ class Driver(Planner):
         self._timer = Timer(self._tick)
 
     # What is drawn, and how
-
-    def set_actor(self, actor: Any) -> None:
-        """Remember whose matrix and renderers count."""
-        other = self.actor()
-        if other is not None and other is not actor:
-            raise InvalidArgumentError(
-                "this VDIMapper is already behind another VDIActor: give each actor its own "
-                "(the VDI itself can be shared)"
-            )
-        self.actor = weakly(actor)
-
-    def leave_actor(self, actor: Any) -> None:
-        """Forget that actor, if it is this one."""
-        if self.actor() is actor:
-            self.actor = lambda: None
 
     def set_input(self, source: Input | None) -> None:
         """Draw another VDI, and show its bounds to VTK at once."""
@@ -97,12 +80,6 @@ class Driver(Planner):
             source.watch(changed)
         self.box.show(source)
 
-    def retry(self) -> None:
-        """Try again what failed before, and give up what is being made in the background."""
-        self.drop()
-        self.failed = ()
-        self.warnings.said.clear()
-
     def release(self) -> None:
         """Free textures, images and what devices hold, and end what goes on; a frame begins anew.
 
@@ -120,6 +97,7 @@ class Driver(Planner):
         self.worker.join()
         release_from_devices(held)
         self._texture.release()
+        self._texture = ImageTexture()  # it holds the image as well
         self._no_depth.release()
         self._last, self._spare = replace(self._last, image=NOTHING.image, key=None), None
 
@@ -129,7 +107,7 @@ class Driver(Planner):
         """Raycast and upload the image for the frame that has just begun."""
         actor, renderer = self.actor(), self.renderer()
         if renderer is None or not _is_drawing(renderer):
-            self.warnings.warn(
+            self.warn(
                 "VDIMapper draws only behind its own VDIActor: use VDIActor in place of vtkVolume, "
                 "also for copies (VDIActor().ShallowCopy(actor))"
             )
@@ -138,8 +116,8 @@ class Driver(Planner):
         components = 1 if actor.GetProperty().GetIndependentComponents() else 4
         if self.box.components != components:
             self.box.give_components(components)
-        frame = Frame.current(renderer, actor, mapper)
-        if frame is None:  # beside the tile of a picture that is drawn
+        frame = self._guarded(Frame.current, renderer, actor, mapper)
+        if frame is None:  # or beside the tile of a picture that is drawn
             return
         window, vtk_window = frame.window, renderer.GetRenderWindow()
         self._window = weakref.ref(window)
@@ -179,7 +157,7 @@ class Driver(Planner):
         frame = replace(frame, depth=opaque_depth([frame]))
         # However the frame is to be: where it is there, full costs nothing
         share = 1 / self.settings.image_distance**2
-        for size in (reduced(frame.full_size, share), self.preview_size(frame)):
+        for size in dict.fromkeys((reduced(frame.full_size, share), self.preview_size(frame))):
             sized = frame.coarser(size)
             if self._last.shows(sized):
                 return self._last
@@ -191,8 +169,8 @@ class Driver(Planner):
         window.pace.drawn(sized.size, sized.full_size, seconds, sized.way, sized.effort)
         # A volume's first picture has kernels compiled and voxels sent to the device
         if sized.volume is None or sized.volume.pictures > 1:
-            pixels = sized.covered_by(sized.bounds)
-            self.costs = self.costs.took(sized.way, sized.angle, pixels, seconds)
+            of = (sized.way, sized.angle, sized.covered_by(sized.bounds), seconds)
+            self.costs = self.costs.took(*of, gpu=not get_runtime(self.device).is_cpu)
         elif self.seen is not None and self.costs.volume is None:
             coarse, taken = frame.coarser(reduced(frame.full_size, FLOOR)), []
             for _ in range(_TRIALS):
@@ -219,16 +197,16 @@ class Driver(Planner):
         if frame.full or not settings.previews:
             window.knows(renderer.GetActiveCamera())
         elif not window.takes_picture(renderer):
-            each = self.costs.volume
-            known = frame.volume is not None and each is not None
-            seconds = each * frame.covered_by(frame.bounds) if known else None  # type: ignore[operator]
+            each, expected = self.costs.volume, None
+            if frame.volume is not None and each is not None:
+                expected = each * frame.covered_by(frame.bounds) + self.costs.fixed
             share = window.pace.share(
                 window.rate(settings),
                 math.prod(frame.full_size),
                 min(1.0, 1 / frame.mapper.GetMaximumImageSampleDistance() ** 2),
                 frame.way,
                 effort=frame.effort,
-                expected=seconds,
+                expected=expected,
             )
         return reduced(frame.full_size, min(share, 1 / settings.image_distance**2))
 
@@ -238,7 +216,7 @@ class Driver(Planner):
         Never raises. What is out of the picture is not brought up to date.
         """
 
-        def in_picture(_: Any) -> Frame | None:
+        def in_picture() -> Frame | None:
             bounds = None if self.input is None else self.input.bounds()
             frame = Frame.current(renderer, self.actor(), mapper, matrix)
             if bounds is None or frame is None or frame.rectangle(bounds) is None:
@@ -247,7 +225,7 @@ class Driver(Planner):
             seen = self._seen_in(frame)
             return None if seen is None or seen.volume is not None else seen
 
-        return self._guarded(in_picture, None)  # type: ignore[no-any-return]
+        return self._guarded(in_picture)  # type: ignore[no-any-return]
 
     # Between frames
 
@@ -263,21 +241,19 @@ class Driver(Planner):
         window = self._window()
         if window is None or window.drawing:
             return
-        swapped = self.advance()
-        if not swapped:
-            self.begin_at_rest(window)
-        if not self.goes_on:
+        another = self.advance() or (self.unsettled and now() - self._moved_at >= SETTLED)
+        if window.moving or not (another or self.goes_on):
             self._timer.stop()
         interactor = self._timer.interactor()
-        if swapped and interactor is not None:
+        if another and interactor is not None:
             interactor.Render()
 
     # Errors in a frame
 
-    def _guarded(self, draw: Callable[[Any], Any], frame: Any) -> Any:
+    def _guarded(self, draw: Callable[..., Any], *of: Any) -> Any:
         """Return what a part of drawing returns, or ``None`` and say what went wrong."""
         try:
-            return draw(frame)
+            return draw(*of)
         except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
             if isinstance(error, InvalidVolumeError):  # as VTK's mappers: there is nothing to see
                 self._last = NOTHING
@@ -289,7 +265,7 @@ class Driver(Planner):
                     "generating the VDI was interrupted: what was shown stays; call "
                     "actor.regenerate() to try again"
                 )
-            self.warnings.warn(message, error)
+            self.warn(message, error)
             # Without the frames that it came from, which hold buffers
             self.trouble = error.with_traceback(None)
             error.__cause__ = error.__context__ = None
@@ -348,29 +324,19 @@ class Driver(Planner):
     # Renderers
 
     def renderer(self) -> Any:
-        """Return the renderer that is drawing the actor; ``None`` if it has none."""
+        """Return the renderer that is drawing the actor, or would; ``None`` if it has none."""
         renderers = self.renderers
-        if len(renderers) > 1:
-            for candidate in renderers:
-                self._follow_renderer(candidate)
-            active = self._active.Get()
-            if active in renderers:
-                return active
-            # The first frame that shows the actor twice: tell them apart by their windows, of which
-            # one is drawing, and by their viewports
-            drawing = [r for r in renderers if _is_drawing(r)]
-            viewports = [r for r in drawing if viewport(r) == tiled(r)]
-            renderers = viewports or drawing or renderers
-        return renderers[0] if renderers else None
-
-    def _follow_renderer(self, renderer: Any) -> None:
-        """From now on, know whether a renderer is between its StartEvent and EndEvent."""
-        if any(known() is renderer for known in self._followed):
-            return
-        self._followed.append(weakly(renderer))
-        active = self._active  # a VTK weak reference: no cycle through the observer
-        renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
-        renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
+        if len(renderers) < 2:
+            return renderers[0] if renderers else None
+        drawing = [each for each in renderers if _is_drawing(each)]
+        for each in drawing:
+            window = Window.of(each.GetRenderWindow())
+            window.shown_in(each)  # from now on it is known which one draws
+            if window.active.Get() is each:
+                return each
+        # The first frame that shows the actor twice: tell them apart by their viewports
+        there = (each for each in drawing if viewport(each) == tiled(each))
+        return next(there, (drawing or renderers)[0])
 
 
 def _is_drawing(renderer: Any) -> bool:

@@ -13,8 +13,8 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
-from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refusing
-from pyvista_vdi.vtk_pipeline.drawing.settings import with_settings
+from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refuse
+from pyvista_vdi.vtk_pipeline.drawing.settings import add_settings
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
@@ -34,30 +34,23 @@ def _on_end(mapper: Any, event: str) -> None:
     mapper.driver.box.end()
 
 
-@with_settings
-@refusing(OF_MAPPERS)
 class VDIMapperMethods:
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
-    _driver: Driver | None = None
+    #: What draws; made with the mapper, before which PyVista's constructor sets some settings.
+    driver: Any = None
 
     def _become_vdi_mapper(self: Any) -> None:
         """Install proxy and observers; to be called once, from ``__init__``."""
-        self._driver = Driver()
+        self.driver: Driver = Driver()
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)
         super().SetScalarModeToUsePointData()  # type: ignore[misc]
-        super().SetInputConnection(self._driver.box.GetOutputPort())  # type: ignore[misc]
+        super().SetInputConnection(self.driver.box.GetOutputPort())  # type: ignore[misc]
         # Plain functions: they get the mapper from VTK and hold nothing
         self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
         self.AddObserver("VolumeMapperRenderEndEvent", _on_end)
-
-    @property
-    def driver(self) -> Driver:
-        """What draws; made with the mapper."""
-        assert self._driver is not None
-        return self._driver
 
     def own_source(self, what: str) -> VDISource:
         """Return the source.
@@ -133,8 +126,7 @@ class VDIMapperMethods:
         """Return the device as it was set."""
         return self.driver.device
 
-    # In VTK's GPU mapper SetAutoAdjustSampleDistances would draw VTK's own volume into a smaller
-    # framebuffer, so its own switch stays off, and what is called from Python keeps ours.
+    # VTK's own switch would draw its volume into a smaller framebuffer
 
     def AutoAdjustSampleDistancesOn(self: Any) -> None:
         """Draw previews."""
@@ -176,6 +168,10 @@ class VDIMapperMethods:
     def _set_input(self: Any, source: Input | None) -> None:
         self.driver.set_input(source)
         self.Modified()
+
+
+refuse(VDIMapperMethods, OF_MAPPERS)
+add_settings(VDIMapperMethods)
 
 
 class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):

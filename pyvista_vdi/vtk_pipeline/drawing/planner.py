@@ -8,16 +8,22 @@ from __future__ import annotations
 import logging
 import math
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.errors import Cancelled, InvalidVolumeError, VDIError
+from pyvista_vdi.errors import (
+    Cancelled,
+    InvalidVolumeError,
+    VDIError,
+    VDIWarning,
+    warn_external,
+)
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.render_options import RenderOptions
+from pyvista_vdi.model.options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View, coverage
 from pyvista_vdi.quality.background import BackgroundThread, Job, vdi_job
@@ -28,15 +34,14 @@ from pyvista_vdi.quality.view_error import (
     angle_from_generating_view,
     magnification,
 )
-from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Matrix, consumers, planes_of
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, consumers, planes_of
 from pyvista_vdi.vtk_pipeline.drawing.images import VolumePicture
 from pyvista_vdi.vtk_pipeline.drawing.overlap import group_of
 from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
-from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, renderer_view, size_of
-from pyvista_vdi.vtk_pipeline.interaction.status import Warnings
-from pyvista_vdi.vtk_pipeline.interaction.window import Window, now
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, size_of
+from pyvista_vdi.vtk_pipeline.interaction.window import now
 
 _log = logging.getLogger(__name__)
 
@@ -61,7 +66,7 @@ class Planner:
         self.settings = MapperSettings()
         self.device: Any = None
         self.input: Input | None = None
-        self.warnings = Warnings()
+        self.said: set[Hashable] = set()  # warnings, or their causes
         self.failed: tuple[Any, ...] = ()  # stamps at which a VDI could not be made
         self.worker = BackgroundThread("pyvista-vdi generation")
         # The thread knows the worker alone, so that this can be collected while it works
@@ -80,7 +85,6 @@ class Planner:
         self._refused: tuple[Any, Any] | None = None  # a content that the device cannot draw
         self._stamp: Any = None  # of all that the last frame depended on
         self._moved_at, self._number = -math.inf, (0, 0)  # and of what frame of which window
-        self._pixels = 0.0  # of the last frame, in which the volume may be seen
 
     def drop(self) -> None:
         """Cancel what is being made in the background."""
@@ -127,7 +131,14 @@ class Planner:
                     _log.debug("the volume cannot be drawn itself", exc_info=unable)
                     kind: Any = "none" if planned.in_bricks or seen.volume != "whole" else "bricks"
                     self._refused = (planned.content, kind)
-                    seen = replace(seen, first_look=False, volume=kind, **self._going_on())
+                    seen = replace(
+                        seen,
+                        first_look=False,
+                        volume=kind,
+                        making=self.making,
+                        estimating=self._asked is not None and self.making is None,
+                        failed=self._stamp in self.failed,
+                    )
         except Cancelled as error:
             if self._volume is None and source.last() is None:
                 raise
@@ -154,23 +165,13 @@ class Planner:
         if self.settings.regenerate == "auto":
             cone = vdi.metadata.get("view_cone")
             cone = cone if isinstance(cone, int | float) else _VIEW_CONE
-            for cause, message in lacking(self._as_made(vdi, frame), cone, source.remedy):
+            for cause, message in lacking(self._as_made(vdi, frame), cone):
                 # Once for all VDIs of one view, such as the steps of a series
-                self.warnings.warn(message, cause=(cause, (vdi.camera, vdi.window_size)))
+                self.warn(message, cause=(cause, (vdi.camera, vdi.window_size)))
         parts = source.parts()
         blended = len(parts) > 1 and parts[0][0] is vdi
         full = not frame.window.previews(self.settings)
         return frame.showing(vdi, full=full, parts=tuple(parts) if blended else ())
-
-    def _going_on(self) -> dict[str, Any]:
-        """Return what is being made, and what was, as fields of :class:`Seen`."""
-        return {
-            "making": self.making,
-            "estimating": self._asked is not None and self.making is None,
-            "estimate": self.estimate,
-            "failed": self._stamp in self.failed,
-            "costs": self.costs,
-        }
 
     def _look(self, source: SourceInput, frame: Frame, *, joint: bool, one_view: bool) -> Seen:
         """Look at all that decides what the frame shows."""
@@ -203,11 +204,12 @@ class Planner:
         self._stamp = stamp
         vdi, made_of = source.last(), source.source.GetCurrentRequest()
         known = vdi is not None and made_of is not None
-        content, volume, self._pixels = None, "whole", 0.0
+        content, volume, late, each = None, "whole", False, self.costs.volume
         if wanted is not None:
             content = wanted.content
-            if watched:
-                self._pixels = frame.covered_by(wanted.volume.bounds)
+            if watched and each is not None and settings.target_fps != 0:
+                seconds = each * frame.covered_by(wanted.volume.bounds) + self.costs.fixed
+                late = window.pace.late(seconds, window.rate(settings))
             if self._refused is not None and content == self._refused[0]:
                 volume = self._refused[1]
         previews = window.previews(settings)
@@ -228,9 +230,13 @@ class Planner:
             first_look=first,
             made=self._as_made(vdi, frame, made_of) if known else None,  # type: ignore[arg-type]
             volume=volume,  # type: ignore[arg-type]
-            late=watched and self._late(window),
+            late=late,
             seconds=1 / (window.pace.headroom * window.rate(settings)) if previews else None,
-            **self._going_on(),
+            making=self.making,
+            estimating=self._asked is not None and self.making is None,
+            estimate=self.estimate,
+            failed=stamp in self.failed,
+            costs=self.costs,
         )
         self.seen = seen if watched else None
         if watched:
@@ -249,20 +255,13 @@ class Planner:
         of = (weakref.ref(vdi), vdi.bounds, content, screen, angle, detail, covered)
         return Made(*of, frame.covered_by(vdi.bounds))
 
-    def _late(self, window: Window) -> bool:
-        """Whether the volume's own full frames of the last view miss the rate."""
-        each, settings = self.costs.volume, self.settings
-        if each is None or settings.target_fps == 0:
-            return False
-        return window.pace.late(each * self._pixels, window.rate(settings))
-
     # What is planned is done
 
-    def _do(self, planned: Plan, seen: Seen, source: SourceInput, frame: Frame | None) -> None:
+    def _do(self, planned: Plan, seen: Seen, source: SourceInput, frame: Frame) -> None:
         """Begin, or give up, what goes on in the background, and make what a frame waits for."""
         if planned.give_up:
             self.drop()
-        if planned.follow and frame is not None:
+        if planned.follow:
             source.follow_if_changed(*frame.seen_from)
         if planned.make is not None:
             try:
@@ -273,10 +272,10 @@ class Planner:
                 for_view = not (seen.stale or seen.chosen)
                 self.making = Making(request.content, planned.make, for_view)
                 self._asked = request
-                self.worker.put(vdi_job(request.generation, request.target))
+                self.worker.put(vdi_job(request, request.target))
         if planned.estimate:
             self._estimate(source, seen.view)
-        if planned.update and frame is not None:
+        if planned.update:
             self._update(source)
 
     def _estimate(self, source: SourceInput, view: View) -> None:
@@ -323,13 +322,10 @@ class Planner:
         return self._volume
 
     def _of_this_view(self, source: SourceInput, frame: Frame) -> VDI:
-        """Make and return a VDI of exactly the frame's view, kept unless the frame is a tile."""
-        whole = frame.full_size == frame.view.size
-        tile = None if whole else (frame.camera, frame.size)
-        wanted = source.exact_request(frame.view, tile)
+        """Make and return a VDI of exactly the frame's view."""
+        wanted = source.exact_request(frame.view)
         vdi = source.source.MakeVDI(wanted)
-        if whole:
-            source.source.TakeVDI(vdi, wanted)
+        source.source.TakeVDI(vdi, wanted)
         return vdi
 
     def _update(self, source: Input) -> None:
@@ -350,17 +346,28 @@ class Planner:
 
     def _complain(self, error: BaseException) -> None:
         """Say once that a VDI cannot be made."""
-        said = None if self.input is None else self.input.complaint(error)
-        usual = (
-            f"the VDI cannot be made anew: {type(error).__name__}: {error}; what was shown stays, "
-            "and actor.regenerate() tries again"
-        )
-        self.warnings.warn(said or usual, error)
+        said = f"another VDI cannot be made: {type(error).__name__}: {error}; what was shown stays"
+        self.warn(f"{said}, and actor.regenerate() tries again", error)
+
+    def warn(
+        self, message: str, error: BaseException | None = None, cause: Hashable = None
+    ) -> None:
+        """Say a thing once: exceptions cannot pass through VTK's renderer. It is in the log, too.
+
+        What has the same ``cause`` was said before.
+        """
+        _log.debug("%s", message, exc_info=error)
+        if (cause or message) not in self.said:
+            self.said.add(cause or message)
+            try:
+                warn_external(message)
+            except VDIWarning:  # warnings are errors: the log is what is left
+                _log.error(message)
 
     # Between frames
 
     def advance(self) -> bool:
-        """Take what was made in the background; whether there is another VDI to be drawn."""
+        """Take what was made in the background; whether a frame has something new to look at."""
         try:
             another = None if self.input is None else self.input.advance()
         except Exception as error:
@@ -378,7 +385,7 @@ class Planner:
         (request, self._asked), self.making = (self._asked, None), None
         if isinstance(made, ViewEstimate):
             self.estimate = made
-            return False
+            return True
         assert isinstance(self.input, SourceInput)
         self.input.source.TakeVDI(made, request)
         self.estimate = None
@@ -386,28 +393,16 @@ class Planner:
             self._volume = None
         return True
 
-    def begin_at_rest(self, window: Window) -> None:
-        """Begin what a view at rest is missing, though no frame asks."""
-        source, seen = self.input, self.seen
-        if not isinstance(source, SourceInput) or seen is None or source.stamp() != self._stamp:
-            return  # what has changed is for a frame to look at
-        still, moving = now() - self._moved_at >= SETTLED, window.moving
-        self.seen = seen = replace(
-            seen,
-            hand=moving and not still,
-            settled=still and not moving,
-            first_look=False,
-            late=self._late(window),
-            **self._going_on(),
-        )
-        self._do(plan(seen), seen, source, None)
+    @property
+    def unsettled(self) -> bool:
+        """Whether what the view is missing at rest is still to be begun, by another frame."""
+        return self.seen is not None and not self.seen.settled
 
     @property
     def goes_on(self) -> bool:
         """Whether something goes on that the event loop has to look at."""
-        if self._asked is not None or (self.input is not None and self.input.playing):
-            return True
-        return self.seen is not None and now() - self._moved_at < SETTLED
+        playing = self.input is not None and self.input.playing
+        return self._asked is not None or playing or self.unsettled
 
     # What is asked for between frames
 
@@ -430,23 +425,8 @@ class Planner:
                 if source.stamp() not in self.failed:
                     self._update(source)
         elif seen is not None:
-            return source.of_view(source.view_for(*seen))
+            return source.source.UpdateFromInput(source.view_for(*seen))
         return source.last()
-
-    def vdi_of_view(self, renderer: Any, matrix: Matrix) -> VDI | None:
-        """Return a VDI of exactly what a renderer shows of an actor of that matrix, (4, 4).
-
-        It is made beside the one that is there; without the volume, or where nobody but
-        ``actor.regenerate()`` may make another, it is that one.
-        """
-        source = self.input
-        if not isinstance(source, SourceInput) or self.settings.regenerate == "never":
-            return self.vdi_asked_for()
-        source.note_scene(self.renderers, matrix)
-        wanted = source.exact_request(renderer_view(renderer, matrix))
-        made = source.source.GetCurrentRequest()
-        same = made is not None and made.key == wanted.key
-        return source.last() if same else source.source.MakeVDI(wanted)
 
     def vdi_to_pick(self, frame: Frame) -> VDI | None:
         """Return a VDI that has all of what a view shows; without a volume, the one there is."""

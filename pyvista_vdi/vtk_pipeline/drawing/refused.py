@@ -3,77 +3,55 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import Any
 
 from pyvista_vdi.errors import UnsupportedError
 
-_Class = TypeVar("_Class", bound=type)
-
-_COMPOSITE = (
+#: Methods of VTK's GPU volume mapper by why they are refused. What turns a thing off is accepted.
+OF_MAPPERS: Mapping[str, tuple[str, ...]] = {
     "a VDI stores what is composited along a ray, so only composite blending is supported: draw "
-    "the volume itself by one of VTK's mappers for another"
-)
-_LIT = (
-    "it lights a volume while it is drawn, and a VDI is lit when it is generated: use "
-    "ambient_occlusion (VDISource.SetAmbientOcclusion), which darkens what is hidden"
-)
-
-#: Methods of VTK's GPU volume mapper. What turns a thing off, or to nothing, is accepted.
-OF_MAPPERS: Mapping[str, str] = {
-    **{
-        f"SetBlendModeTo{name}": _COMPOSITE
-        for name in (
-            *("MaximumIntensity", "MinimumIntensity", "AverageIntensity"),
-            *("Additive", "IsoSurface", "Slice"),
-        )
-    },
-    "SetBlendMode": _COMPOSITE,  # composite blending is 0
-    "SetGlobalIlluminationReach": _LIT,
-    "SetVolumetricScatteringBlending": _LIT,
-    "SetMaskInput": "a VDI cannot be masked when it is drawn: set masked voxels to a transparent "
-    "value, or hide them (AllocatePointGhostArray), before it is generated",
-    **dict.fromkeys(
-        (
-            *("SetScalarMode", "SetScalarModeToUsePointFieldData", "SetScalarModeToUseCellData"),
-            *("SetScalarModeToUseCellFieldData", "SelectScalarArray", "SetArrayName", "SetArrayId"),
-        ),
-        "the array is chosen by VDISource.SetScalars(name)",
+    "the volume itself by one of VTK's mappers for another": (
+        *("SetBlendMode", "SetBlendModeToMaximumIntensity", "SetBlendModeToMinimumIntensity"),
+        *("SetBlendModeToAverageIntensity", "SetBlendModeToAdditive", "SetBlendModeToIsoSurface"),
+        "SetBlendModeToSlice",
     ),
-    "AddInputConnection": "a VDIMapper draws one VDI: give each its own VDIMapper and VDIActor",
+    "it lights a volume while it is drawn, and a VDI is lit when it is generated: use "
+    "ambient_occlusion (VDISource.SetAmbientOcclusion), which darkens what is hidden": (
+        *("SetGlobalIlluminationReach", "SetVolumetricScatteringBlending"),
+    ),
+    "a VDI cannot be masked when it is drawn: set masked voxels to a transparent value, or hide "
+    "them (AllocatePointGhostArray), before it is generated": ("SetMaskInput",),
+    "the array is chosen by VDISource.SetScalars(name)": (
+        *("SetScalarMode", "SetScalarModeToUsePointFieldData", "SetScalarModeToUseCellData"),
+        *("SetScalarModeToUseCellFieldData", "SelectScalarArray", "SetArrayName", "SetArrayId"),
+    ),
+    "a VDIMapper draws one VDI: give each its own VDIMapper and VDIActor": ("AddInputConnection",),
 }
-
-_WORLD = (
-    "a VDI is placed in the world: leave the coordinate system at WORLD, and move it by "
-    "SetUserMatrix or SetPosition"
-)
 
 #: Methods of vtkVolume.
-OF_ACTORS: Mapping[str, str] = {
-    "SetCoordinateSystem": _WORLD,  # WORLD is 0
-    "SetCoordinateSystemToPhysical": _WORLD,
-    "SetCoordinateSystemToDevice": _WORLD,
-    "SetShaderProperty": "its shader shows the VDI: set colours and opacities by the volume "
-    "property, or draw the volume by a vtkVolume and VTK's mapper",
+OF_ACTORS: Mapping[str, tuple[str, ...]] = {
+    "a VDI is placed in the world: leave the coordinate system at WORLD, and move it by "
+    "SetUserMatrix or SetPosition": (
+        *("SetCoordinateSystem", "SetCoordinateSystemToPhysical", "SetCoordinateSystemToDevice"),
+    ),
+    "its shader shows the VDI: set colours and opacities by the volume property, or draw the "
+    "volume by a vtkVolume and VTK's mapper": ("SetShaderProperty",),
 }
 
 
-def refusing(methods: Mapping[str, str]) -> Callable[[_Class], _Class]:
-    """Return a decorator of classes whose methods of these names raise, and say why."""
-
-    def refusing_them(of: _Class) -> _Class:
-        for name, reason in methods.items():
+def refuse(of: type, methods: Mapping[str, tuple[str, ...]]) -> None:
+    """Have methods of a class raise, and say why."""
+    for reason, names in methods.items():
+        for name in names:
             setattr(of, name, _refusal(name, reason))
-        return of
-
-    return refusing_them
 
 
 def _refusal(name: str, reason: str) -> Callable[..., None]:
-    def refuse(self: Any, *args: Any) -> None:
+    def refused(self: Any, *args: Any) -> None:
         off = name.startswith("Set") and args and (args[-1] is None or args[-1] == 0)
         if not off:
             raise UnsupportedError(f"{name} is not for a VDI: {reason}")
 
-    refuse.__name__ = refuse.__qualname__ = name
-    refuse.__doc__ = f"Refuse: {reason}."
-    return refuse
+    refused.__name__ = refused.__qualname__ = name
+    refused.__doc__ = f"Refuse: {reason}."
+    return refused

@@ -10,11 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.vtk_pipeline.vtk import (
-    VTK_FLOAT,
-    vtkOpenGLActor,
-    vtkTextureObject,
-)
+from pyvista_vdi.vtk_pipeline.vtk import VTK_FLOAT, vtkTextureObject
 
 
 class _Texture:
@@ -40,7 +36,7 @@ class _Texture:
             self._texture.Deactivate()
 
     def release(self) -> None:
-        """Free it, for the next frame to fill it anew; a mapper may keep the object."""
+        """Free it, for the next frame to fill it anew."""
         window = None if self._texture is None else self._texture.GetContext()
         if window is not None:
             self._texture.ReleaseGraphicsResources(window)
@@ -69,11 +65,6 @@ class ImageTexture(_Texture):
             self._uploaded = image
         texture.Activate()
         return int(texture.GetTextureUnit())
-
-    def release(self) -> None:
-        """Free the texture and its object."""
-        super().release()
-        self._texture = self._uploaded = None
 
 
 class NoDepth(_Texture):
@@ -124,32 +115,24 @@ _PEELED = f"""
 #undef castRay
 """
 
-#: Under screen-space ambient occlusion finalizeRayCast writes depth, place and normal of what VTK's
-#: ray caster has hit: nothing, far away. A VDI leaves those that are there.
-_UNSEEN = """
-  gl_FragDepth = 0.0;
-  fragOutput1 = vec4(0.0);
-  fragOutput2 = vec4(0.0);
-"""
-
 #: For boxes that float32 cannot place: one about the origin, whose front or back face, whichever is
 #: not culled, is made the viewport, at the near plane.
 _FILL = """
   gl_Position = vec4(in_vertexPos.xy * {scale!r}, -0.999, 1.0);
 """
 
-#: What in VTK's template calls its ray caster, and what declares custom uniforms.
-_CUSTOM = "//VTK::CustomUniforms::Dec"
-_CALL = "//VTK::CallWorker::Impl"
 _POSITION = "//VTK::ComputeClipPos::Impl"
 
-#: What only VTK's ray caster needs, and render passes would add to.
-_UNUSED = (
-    "//VTK::ComputeLighting::Dec",
-    "//VTK::ComputeColor::Dec",
-    "//VTK::Shading::Impl",
-    "//VTK::RenderToImage::Impl",
-)
+#: What takes the place of VTK's tags: nothing where only its ray caster needs it, and render passes
+#: would add to it.
+_REPLACED = {
+    "//VTK::Base::Dec": _DECLARATION,
+    "//VTK::CustomUniforms::Dec": _UNIFORMS,
+    "//VTK::ComputeLighting::Dec": "",
+    "//VTK::ComputeColor::Dec": "",
+    "//VTK::Shading::Impl": "",
+    "//VTK::RenderToImage::Impl": "",
+}
 
 
 def show_image(actor: Any, renderer: Any = None) -> None:
@@ -158,33 +141,12 @@ def show_image(actor: Any, renderer: Any = None) -> None:
     A property that is modified has the shader rebuilt, so what is in place is left.
     """
     shader = actor.GetShaderProperty()
-    peeled = occluded = False
-    if renderer is not None:
-        peeled = renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes()
-        occluded = "vtkSSAOPass" in _passes(renderer.GetPass())
-    if occluded and actor.GetPropertyKeys() is not None:  # which the pass has given it
-        actor.GetPropertyKeys().Remove(vtkOpenGLActor.GLDepthMaskOverride())
-    text = _PEELED if peeled else _LOOKUP + _UNSEEN if occluded else _LOOKUP
-    placed = _placed(shader)
-    if not placed:
-        shader.AddFragmentShaderReplacement("//VTK::Base::Dec", True, _DECLARATION, False)
-        shader.AddFragmentShaderReplacement(_CUSTOM, True, _UNIFORMS, False)
-        for unused in _UNUSED:
-            shader.AddFragmentShaderReplacement(unused, True, "", False)
-    if placed.get(_CALL) != text:
-        shader.AddFragmentShaderReplacement(_CALL, True, text, False)
-        placed[_CALL] = text
-
-
-def _passes(first: Any) -> set[str]:
-    """Return the classes of a render pass and of those behind it."""
-    if first is None:
-        return set()
-    behind = [first.GetDelegatePass()] if hasattr(first, "GetDelegatePass") else []
-    members: Any = first.GetPasses() if hasattr(first, "GetPasses") else None
-    count = 0 if members is None else members.GetNumberOfItems()
-    behind += [members.GetItemAsObject(i) for i in range(count)]
-    return {first.GetClassName()}.union(*map(_passes, behind))
+    peeled = renderer is not None and renderer.GetUseDepthPeelingForVolumes()
+    looked_up = _PEELED if peeled and renderer.GetUseDepthPeeling() else _LOOKUP
+    if vars(shader).get("looked_up") != looked_up:
+        vars(shader)["looked_up"] = looked_up
+        for tag, text in {**_REPLACED, "//VTK::CallWorker::Impl": looked_up}.items():
+            shader.AddFragmentShaderReplacement(tag, True, text, False)
 
 
 def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:
@@ -200,15 +162,10 @@ def fill_viewport(actor: Any, edge: float | None) -> None:
     """Fill the viewport with a cube about the origin, of that edge; ``None``: boxes are boxes."""
     shader = actor.GetShaderProperty()
     text = None if edge is None else _FILL.format(scale=2 / edge)
-    if text == _placed(shader).get(_POSITION):
+    if text == vars(shader).get("filled"):
         return
-    _placed(shader)[_POSITION] = text
+    vars(shader)["filled"] = text
     if text is None:
         shader.ClearVertexShaderReplacement(_POSITION, True)
     else:
         shader.AddVertexShaderReplacement(_POSITION, True, text, False)
-
-
-def _placed(shader: Any) -> dict[str, str | None]:
-    """Return what is in place now, by its tag."""
-    return vars(shader).setdefault("placed", {})  # type: ignore[no-any-return]

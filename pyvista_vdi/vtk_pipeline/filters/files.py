@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.io import checked_target, read, read_info
 from pyvista_vdi.io.files import holds
-from pyvista_vdi.model.inputs import as_any_vdi
-from pyvista_vdi.model.packing import check_precision
+from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.model.deferred import DeferredVDI
+from pyvista_vdi.model.inputs import as_vdi
+from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.vdi import picture_size
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     Algorithm,
@@ -77,11 +80,13 @@ class VDIReader(VDIFileAlgorithm):
     def _execute(self, inputs: Any, outputs: Any) -> None:
         image = vtkImageData.GetData(outputs, 0)
         if self._series is None:  # what is wrong with one is raised by reading it
-            image.ShallowCopy(vdi_to_image(as_any_vdi(read(self._path()))))
+            found = read(self._path())
+            vdi = found if isinstance(found, DeferredVDI) else as_vdi(found)
+            image.ShallowCopy(vdi_to_image(vdi))
             return
         time = wanted_time(outputs.GetInformationObject(0))
         step = 0 if time is None else self._series.nearest(time)
-        vdi = as_any_vdi(self._series[step])
+        vdi = self._series[step]
         announce(outputs, vdi.window_size)
         ask_for_all([outputs])
         image.ShallowCopy(vdi_to_image(vdi))
@@ -97,7 +102,7 @@ class VDIWriter(VDIFileAlgorithm):
     SetPrecision, GetPrecision = accessors(
         "precision",
         "what a supersegment takes: ``'exact'`` or ``'8-byte'``; ``None``: as of the VDI",
-        check=lambda precision: None if precision is None else check_precision(precision),
+        check=partial(one_of, name="precision", names=PRECISIONS, none=True),
     )
     SetCompression, GetCompression = accessors(
         "compression", "the compression, as of :meth:`VDI.save`; ``None``: the file's usual one"

@@ -1,18 +1,13 @@
-"""What a person is told of a VDI on the screen: its status and warnings."""
+"""What a person is told of a VDI on the screen."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
-from pyvista_vdi.errors import VDIWarning, warn_external
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.costs import RenderMode
 from pyvista_vdi.quality.targets import describe
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -74,14 +69,6 @@ class VDIStatus:
         """Share of the viewport's pixels that a ray was cast for, 0 to 1."""
         return self.samples / self.full_samples if self.full_samples else 0.0
 
-    @property
-    def dial(self) -> dict[str, Any] | None:
-        """What a dial chose for the VDI, and what it predicts; ``None`` where there is none.
-
-        See ``vdi.metadata["dial"]`` in docs/dial.md.
-        """
-        return None if self.vdi is None else self.vdi.metadata.get("dial")
-
     def __str__(self) -> str:
         if self.mode == "none":
             parts = ["no VDI drawn yet"]
@@ -106,22 +93,3 @@ class VDIStatus:
         if self.progress is not None:
             parts.append(f"making the next: {self.progress:.0%}")
         return ", ".join(parts)
-
-
-class Warnings:
-    """Says each thing once, as a VDIWarning: exceptions cannot pass through VTK's renderer."""
-
-    def __init__(self) -> None:
-        self.said: set[Hashable] = set()
-
-    def warn(
-        self, message: str, error: BaseException | None = None, *, cause: Hashable = None
-    ) -> None:
-        """Warn, unless this, or its cause, was said before; a traceback goes to the log."""
-        _log.debug("%s", message, exc_info=error)
-        if (cause or message) not in self.said:
-            self.said.add(cause or message)
-            try:
-                warn_external(message)
-            except VDIWarning:  # warnings are errors: the log is what is left
-                _log.error(message)

@@ -55,21 +55,16 @@ class Timer:
         self._period = PERIOD
         self._observers: tuple[int, ...] = ()
 
-    @property
-    def running(self) -> bool:
-        """Whether the interactor calls."""
-        return self._timer > 0
-
     def start(self, interactor: Any, period: int = PERIOD) -> None:
         """Tick every so many milliseconds, if it does not already, in this interactor."""
         if interactor is not self.interactor() or interactor is None:
             self.stop()
-        if interactor is not None and not (self.running and period == self._period):
-            if not self._observers:
-                self._observe(interactor)
-            self._pause()
-            self._timer = interactor.CreateRepeatingTimer(period)
-        self._period = period
+        if interactor is None or (self._timer > 0 and period == self._period):
+            return
+        if not self._observers:
+            self._observe(interactor)
+        self._pause()
+        self._timer, self._period = interactor.CreateRepeatingTimer(period), period
 
     def stop(self) -> None:
         """End: nothing is left at the interactor."""
@@ -82,7 +77,7 @@ class Timer:
 
     def _pause(self) -> None:
         interactor = self.interactor()
-        if interactor is not None and self.running:
+        if interactor is not None and self._timer > 0:
             interactor.DestroyTimer(self._timer)
         self._timer = 0
 

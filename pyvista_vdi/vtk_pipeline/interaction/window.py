@@ -22,6 +22,7 @@ from pyvista_vdi.vtk_pipeline.vtk import (
     vtkMatrix4x4,
     vtkOpenGLGL2PSHelper,
     vtkVolume,
+    vtkWeakReference,
     weakly,
 )
 
@@ -34,7 +35,7 @@ _INTERACTIVE = 1.0
 _RATE = 30.0
 
 #: By the windows' addresses.
-_windows: dict[str, weakref.ref[Window]] = {}
+_windows: weakref.WeakValueDictionary[str, Window] = weakref.WeakValueDictionary()
 
 
 def now() -> float:
@@ -90,12 +91,15 @@ class Window:
         What they have taken.
     of_frame : dict
         What those who draw share within a frame; empty between two.
+    active : vtkWeakReference
+        The renderer that is between its start and its end.
     """
 
     def __init__(self, window: Any) -> None:
         self.number = 0
         self.pace = Pace()
         self.of_frame: dict[Any, Any] = {}
+        self.active = vtkWeakReference()
         self._window = weakly(window)
         self._renderers: list[Callable[[], Any]] = []  # that have drawn a VDI
         self._known: list[Callable[[], Any]] = []
@@ -112,13 +116,9 @@ class Window:
     def of(cls, window: Any) -> Window:
         """Return that of a VTK window, made on first use."""
         address = window.GetAddressAsString("")
-        known = _windows.get(address)
-        found = None if known is None else known()
+        found = _windows.get(address)
         if found is None or found._window() is not window:
-            for gone in [key for key, each in list(_windows.items()) if each() is None]:
-                _windows.pop(gone, None)
-            found = cls(window)
-            _windows[address] = weakref.ref(found)
+            found = _windows[address] = cls(window)
         return found
 
     def shown_in(self, renderer: Any) -> list[ShownVolume]:
@@ -135,20 +135,20 @@ class Window:
                         window._camera_changed()
 
                 renderer.AddObserver("ActiveCameraEvent", camera_changed)
+                active = self.active  # no cycle through the observers
+                renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
+                renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
             self.of_frame[key] = list(_volumes_of(renderer.GetViewProps()))
         return self.of_frame[key]  # type: ignore[no-any-return]
 
-    @property
     def shown(self) -> list[tuple[Any, ShownVolume]]:
-        """The VDIs of this window, each with the renderer that shows it."""
-        window, there = self._window(), [known() for known in self._renderers]
-        there = [each for each in there if each is not None and window.HasRenderer(each)]
-        return [(r, v) for r in there for v in self.shown_in(r) if v.driver is not None]
-
-    @property
-    def drivers(self) -> list[Any]:
-        """Those of all VDIs in this window."""
-        return list(dict.fromkeys(each.driver for _, each in self.shown))
+        """Return the VDIs of this window, each with the renderer that shows it."""
+        window, found = self._window(), []
+        for known in self._renderers:
+            renderer = known()
+            if renderer is not None and window.HasRenderer(renderer):
+                found += [(renderer, v) for v in self.shown_in(renderer) if v.driver is not None]
+        return found
 
     @property
     def drawing(self) -> bool:
@@ -198,8 +198,9 @@ class Window:
         A screenshot draws in tiles, or with a camera of its own; an export of vector graphics has
         a helper installed.
         """
-        return self._keeps_picture() or not self.knows(renderer.GetActiveCamera())
+        return self._keeps_picture or not self.knows(renderer.GetActiveCamera())
 
+    @property
     def _keeps_picture(self) -> bool:
         """Whether this frame is drawn to be kept, whatever its cameras are."""
         exported = vtkOpenGLGL2PSHelper.GetInstance() is not None
@@ -222,7 +223,7 @@ class Window:
         self.number += 1
         # Between two frames only: no frame shows two generations, nor does a picture in tiles
         window = self._window()
-        drivers = self.drivers
+        drivers = dict.fromkeys(each.driver for _, each in self.shown())
         if self.whole_picture:
             for driver in drivers:
                 driver.advance()
@@ -242,12 +243,12 @@ class Window:
 
     def _may_go_without(self) -> bool:
         """Whether a frame may go without multisampling: all VDIs of the window let previews do."""
-        shown = [(each.driver.settings, r) for r, each in self.shown if each.visible]
+        shown = [(each.driver.settings, r) for r, each in self.shown() if each.visible]
         cameras = [known() for known in self._known]
         return bool(shown) and all(
             settings.adjust_multi_samples
             and self.previews(settings)
-            and not self._keeps_picture()
+            and not self._keeps_picture
             and renderer.GetActiveCamera() in cameras
             for settings, renderer in shown
         )

@@ -321,7 +321,7 @@ def test_a_recorded_file_of_two_shows_both(default_runtime):
     [
         ("no_back", "60 samples without a thickness"),
         ("renamed", r"has the channels left\.A, .* needs Z, ZBack, A, R, G and B"),
-        ("flat", "has 0 deep images .* write a flat image, which says nothing about depth, as a"),
+        ("flat", "has 0 deep images .* nor has a flat image, which says nothing about depth"),
         ("parts", "has 2 deep images .* take one of several out by oiiotool"),
     ],
 )

@@ -45,7 +45,7 @@ def shown(plotter, series, **options):
 
 def test_each_step_is_drawn_as_its_vdi(plotter, series):
     actor = shown(plotter, series)
-    assert (actor.player.series, actor.player.time, actor.vdi) == (series, 0.0, series[0])
+    assert (actor.player.collection, actor.player.time, actor.vdi) == (series, 0.0, series[0])
     pictures = []
     for k, now in enumerate(series.times):
         actor.player.time = now + 0.1
