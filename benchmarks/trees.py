@@ -1,6 +1,7 @@
-"""Two trees, the one that this file is in and another: frames, generation, first pictures, bits.
+"""Two trees, the one that this file is in and another: frames, generation, bits.
 
     python benchmarks/trees.py --other ../other-worktree
+    python benchmarks/trees.py --switch "no prefetch"    # this tree, with another text of kernels
 
 Each tree runs in a process of its own that does one thing when told to; the two take turns, and the
 pictures' bits are compared. A ratio is this tree's time over the other one's, turn by turn; times
@@ -12,6 +13,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -21,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from scipy.stats import mannwhitneyu
-from shared import Case, Results, execute, mean_of, parser_of, table  # beside this file
+from shared import CHECKOUT, Case, Results, execute, mean_of, parser_of, table  # beside this file
 
 from pyvista_vdi.measure import bench
 
@@ -29,6 +32,15 @@ from pyvista_vdi.measure import bench
 VOLUMES = ("brain", "heptane", "rayleigh_taylor", "visible_female_head")
 ANGLES = (0.0, 5.0, 30.0, 90.0)
 CLOCKS = ("cpu", "wall")
+
+#: Regular expressions for texts of kernels, and what may stand in their place.
+SWITCHES = {
+    "no prefetch": (r"prefetch\(words \+ k, 1\);", ";"),
+    "16-byte loads of media": (
+        r"two_floats\(lists->media\[2 \* entry\]\),\s*two_floats\(.*\)",
+        "vload4(entry, (__global const float *)lists->media))",
+    ),
+}
 
 #: Reads orders, a JSON a line: what, volume, look, size, angle, options. By public names alone.
 WORKER = """
@@ -70,20 +82,6 @@ for line in sys.stdin:
     print(json.dumps({**times, "bits": bits}), flush=True)
 """
 
-#: A process's first picture: the shipped brain in a plotter.
-FIRST = """
-import json, sys, time
-wall = time.perf_counter()
-import pyvista as pv
-import pyvista_vdi as pvdi
-plotter = pv.Plotter(off_screen=True, window_size=json.loads(sys.argv[1]))
-plotter.add_vdi(pvdi.examples.load_brain(), cmap="bone")
-bits = plotter.screenshot(return_img=True).tobytes()
-import hashlib
-print(json.dumps({"cpu": time.process_time(), "wall": time.perf_counter() - wall,
-                  "bits": hashlib.sha1(bits).hexdigest()}))
-"""
-
 
 def importable(tree: Path, folder: Path) -> dict[str, Any]:
     """Return where and with what a process runs the package of a tree, kernels in their place."""
@@ -93,6 +91,20 @@ def importable(tree: Path, folder: Path) -> dict[str, Any]:
         if not (package / path.name).exists():
             (package / path.name).symlink_to(path)
     return {"cwd": folder, "env": {**os.environ, "PYTHONPATH": str(folder)}, "text": True}
+
+
+def switched(tree: Path, folder: Path, old: str, new: str) -> Path:
+    """Return a tree with another text in its kernels."""
+    shutil.copytree(tree / "opencl", folder / "opencl")
+    (folder / "pyvista_vdi").symlink_to((tree / "pyvista_vdi").resolve())
+    changed = 0
+    for path in folder.rglob("*.cl"):
+        text, count = re.subn(old, new, path.read_text())
+        path.write_text(text)
+        changed += count
+    if not changed:
+        raise SystemExit(f"no kernel has {old!r} any more: change SWITCHES")
+    return folder
 
 
 class Worker:
@@ -120,22 +132,20 @@ class Worker:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, and write what was found."""
     parser = parser_of(__doc__, size=(1280, 720), volumes=VOLUMES, repeats=5)
-    parser.add_argument("--other", type=Path, required=True, help="root of the other tree")
+    parser.add_argument("--other", type=Path, default=CHECKOUT, help="root of the other tree")
+    parser.add_argument("--switch", choices=SWITCHES, help="change the text of its kernels")
     options = parser.parse_args(arguments)
-    roots = {"this": Path(__file__).resolve().parents[1], "other": options.other}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        roots = {"this": CHECKOUT, "other": options.other}
+        if options.switch is not None:
+            roots["other"] = switched(options.other, folder / "switched", *SWITCHES[options.switch])
         where = {name: importable(root, folder / name) for name, root in roots.items()}
         trees = {name: Worker(of) for name, of in where.items()}
         for worker in trees.values():
             stack.callback(worker.close)
 
         def once(name: str, case: Case) -> dict[str, Any]:
-            if case.what == "first picture":
-                size = json.dumps(list(options.size))
-                command = [sys.executable, "-c", FIRST, size]
-                done = subprocess.run(command, stdout=subprocess.PIPE, check=True, **where[name])
-                return dict(json.loads(done.stdout.splitlines()[-1]))
             given = {"size": list(options.size), "device": options.device}
             given |= {"volume": case.volume, "look": case.look, "what": case.what}
             return trees[name].ask(angle=case.angle, **given)
@@ -163,7 +173,6 @@ def cases_of(options: Any) -> Iterator[Case]:
             yield Case(volume, look, size, 5.0, what="render_volume")
             for angle in ANGLES:
                 yield Case(volume, look, size, angle, what="frame")
-    yield Case("brain", None, size, what="first picture")
 
 
 def ratio(row: dict[str, Any], clock: str = "cpu") -> float:
@@ -180,7 +189,7 @@ def report(results: Results, every: list[Case]) -> Iterator[str]:
     for row in results.rows():
         case, times = row["case"], row["times"]
         chance = mannwhitneyu(*(times[who]["cpu"] for who in ("this", "other"))).pvalue
-        cells = [case["what"], case["volume"], case.get("look", ""), case.get("angle", "")]
+        cells = [case["what"], case["volume"], case["look"], case.get("angle", "")]
         cells += [f"{ratio(row, clock):.3f}" for clock in CLOCKS]
         rows.append([*cells, f"{chance:.1%}", "the same" if row["same"] else "**differ**"])
     heads = ("what", "volume", "look", "degrees", "CPU time", "wall clock", "chance", "bits")

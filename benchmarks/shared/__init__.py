@@ -15,8 +15,6 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from pyvista_vdi import VDIError, Volume, examples
 from pyvista_vdi.cli.declare import size as parse_size
 from pyvista_vdi.cli.text import write_text
@@ -170,6 +168,8 @@ def execute(
     plan = {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items() if k != "out"}
     results = Results(path, kind, plan, rooms, "whole" if options.whole else "sample")
     refused = []
+    from tqdm import tqdm  # which a machine that is lent for minutes may lack
+
     for case in tqdm(chosen, disable=not sys.stderr.isatty()):
         try:
             results.add(case, measure(case))

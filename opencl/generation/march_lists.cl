@@ -12,7 +12,6 @@
 // Lengths along a ray are t, the view depth of V_O less the VDI's depth origin, world units; with
 // DOUBLE_FLOAT_RAYS, less that of where the ray enters, until they are packed.
 #include "volume/march.cl"
-#include "volume/samples.cl"
 #include "generation/merging.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -21,7 +20,7 @@
 // Records are in the order of the rays, counts and offsets in the order of the lists.
 KERNEL_OF_LANES void march_lists(
     MEDIUM_PARAMETERS, const RaysOfView view, __global const float *forms,
-    __global const float4 *samples, // see volume/samples.cl; 0: steps are sampled here
+    __global const float4 *samples, // see volume/rays_of_view.cl; 0: steps are sampled here
     const Recording recording,
     __global const float
         *entering, // light that enters the part of the grid along each ray, 0 to 1; 0: all of it

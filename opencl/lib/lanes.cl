@@ -79,13 +79,11 @@ typedef const volatile int Place;
     {                                                                                              \
         if (VECTOR_FUNCTIONS)                                                                      \
             return of_number(x);                                                                   \
-        const float *of_x = (const float *)&x;                                                     \
-        return (Real)(of_number(of_x[0]), of_number(of_x[1]), of_number(of_x[2]),                  \
-                      of_number(of_x[3]), of_number(of_x[4]), of_number(of_x[5]),                  \
-                      of_number(of_x[6]), of_number(of_x[7]), of_number(of_x[8]),                  \
-                      of_number(of_x[9]), of_number(of_x[10]), of_number(of_x[11]),                \
-                      of_number(of_x[12]), of_number(of_x[13]), of_number(of_x[14]),               \
-                      of_number(of_x[15]));                                                        \
+        float each[LANES];                                                                         \
+        vstore16(x, 0, each);                                                                      \
+        for (int n = 0; n < LANES; ++n)                                                            \
+            each[n] = of_number(each[n]);                                                          \
+        return vload16(0, each);                                                                   \
     }
 #else
 typedef float Real;

@@ -137,7 +137,6 @@ inline Rays rays_at(int2 corner, int width, int height)
 }
 
 // Those of part of a window, from the `first` on; x and y are of the part.
-
 inline Rays rays_of_part(uint first, int width, int height, int first_column, int columns,
                          int first_row, int rows)
 {
@@ -175,4 +174,23 @@ inline int2 cell_pixel(__global const int2 *cells, int item)
     const int place = item % CELL_ITEMS;
     return (int2)((cell.x * STRIP + place / COLUMN_ITEMS) << 2 | (place & 3),
                   cell.y * (4 * STRIP) + (place % COLUMN_ITEMS >> 2));
+}
+
+// Places of pixels (x, y) of a window in its picture, whose top row comes first; -1 where there is
+// none.
+inline Int places_in_picture(Int x, Int y, Int in_window, int width, int height)
+{
+    return SELECT((Int)(-1), (height - 1 - y) * width + x, in_window);
+}
+
+// t at which the rays end, by pixel; without `opaque_depth` they do not.
+inline Real opaque_ends(Int pixels, __global const float *opaque_depth)
+{
+    if (!opaque_depth)
+        return (Real)(INFINITY);
+    const Places places = {pixels};
+    Place *place = places.each;
+#define END(n) (place[n] < 0 ? 0.0f : opaque_depth[place[n]])
+    return OF_LANES(Real, END);
+#undef END
 }

@@ -36,7 +36,6 @@ inline Real4 load_fours(__global const float4 *from, Int at)
 #undef FOUR
 #undef FOURS
 }
-#define load_halves load_fours
 
 // Store four numbers of each lane as the `at`-th four, but of lanes whose place is negative.
 inline void store_fours(__global float4 *to, Int at, Real4 fours)
@@ -64,12 +63,5 @@ inline void store_fours(__global float4 *to, int at, float4 four)
 {
     if (at >= 0)
         to[at] = four;
-}
-
-// The same in two loads, where a vector's lanes load from different places, and not in four.
-inline float4 load_halves(__global const float4 *from, int at)
-{
-    __global const ulong *halves = (__global const ulong *)(from + at);
-    return (float4)(as_float2(halves[0]), as_float2(halves[1]));
 }
 #endif

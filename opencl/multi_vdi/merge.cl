@@ -8,7 +8,7 @@
 // there. The sums are formed in the order of the streams.
 //
 // -D STREAMS   how many VDIs
-#include "lib/pixels.cl"
+#include "lib/rays.cl"
 #include "lib/compositing.cl"
 #include "multi_vdi/pool.cl"
 #pragma OPENCL FP_CONTRACT OFF

@@ -3,12 +3,12 @@
 //
 // A segment is a piece of a ray in one supersegment: t where it begins and ends (view depth of V_N
 // less the frame's reference depth, world units), optical depth, straight RGB. A ray's streams lie
-// behind one another in its slots, a segment's numbers together, so that a vector's lanes are loaded
-// and stored in whole rows.
+// behind one another in its slots, a segment's numbers together, so that a vector's lanes are
+// loaded and stored in whole rows.
 #include "lib/transpose.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#define BOX_PLANES 6 // of a VDI's bounds: the first of its planes to clip to
+#define BOX_PLANES 6            // of a VDI's bounds: the first of its planes to clip to
 #define MAX_OPTICAL_DEPTH 1e30f // more cannot be told from opaque, and a part of it is a number
 
 // t behind which nothing is seen because of the VDIs before, as a VDI's own t: not less, by what

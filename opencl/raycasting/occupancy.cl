@@ -32,22 +32,8 @@ inline void count_supersegment(const Counted *grid, float front, float back, __g
         atomic_dec(cells + last + 1);
 }
 
-// One work-item per list.
-__kernel void
-count_supersegments(__global const ulong *starts, // of the lists, width * height + 1
-                    __global const float *fronts, // view depth less depth_origin
-                    __global const float *backs, Counted grid,
-                    __global uint *changes) // of the counts: stacks_high, stacks_wide, SLABS; all 0
-{
-    const size_t list = get_global_id(0);
-    if (list >= (size_t)grid.width * (size_t)grid.height)
-        return;
-    __global uint *cells = cells_of_list(&grid, list, changes);
-    for (ulong k = starts[list]; k < starts[list + 1]; ++k)
-        count_supersegment(&grid, fronts[k], backs[k], cells);
-}
-
-// The same of lists of 8 bytes, whose faces are codes of depth (model/packing.py).
+// Count those of lists of 8 bytes, whose faces are codes of depth (model/packing.py): one work-item
+// per list. Exact ones are counted where they are prepared (raycasting/prepare.cl).
 __kernel void count_packed(__global const ulong *starts,
                            __global const int *origins,    // of the lists' depths, steps
                            __global const ushort *strides, // steps per code

@@ -1,5 +1,8 @@
 // A VDI's arrays to what the raycaster reads: faces in list space and extinction in place of
-// optical depth, by bundles of lists (raycasting/supersegments.cl, whose -D names hold here).
+// optical depth, by bundles of lists (raycasting/supersegments.cl, whose -D names hold here), which
+// are counted in the occupancy grid.
+#include "lib/values.cl"
+#include "raycasting/occupancy.cl"
 #include "raycasting/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -27,47 +30,73 @@ inline float prepared_extinction(float front, float back, float optical_depth, f
     return fmin(optical_depth / fmax((back - front) * per_depth, FLT_MIN), FLT_MAX);
 }
 
-// One work-item per list.
-__kernel void prepare_lists(
-    __global const ulong *starts,     // of the lists in the arrays, width * height + 1
-    __global const HEADER_T *headers, // of the bundles of lists
-    __global const float *fronts,     // view depth less depth_origin
+#if !PACKED
+// One work-item per bundle of lists. Of a deferred VDI's values, to which a transfer function is
+// applied, what is transparent is left out: the rest moves up.
+__attribute__((vec_type_hint(float16))) __kernel void prepare_lists(
+    __global const ulong *starts, // of the lists in the arrays, width * height + 1
+    __global const ulong *places, // headers of the bundles with all supersegments
+    __global const float *fronts, // view depth less depth_origin
     __global const float *backs,
-    __global const float *colors, // straight RGB
-    __global const float *optical_depths,
+    __global const float *colors, // straight RGB; 0: there are values
+    __global const float *optical_depths, __global const float *means,
+    __global const float *spreads,
+    __global const float *steps,      // of the march, in each supersegment
+    __global const float4 *integrals, // as lib/values.cl has them
+    int cells,
     float depth_origin, // world units
     float nearest,      // least view depth that is in front of the eye, world units
-    int width, int height,
     __global const float
         *centre_ray, // 9: model-frame direction of the ray of pixel offsets (a, b), rows 1, a, b
-    __global float2 *faces, // (front, back)
+    Counted grid,
+    __global uint *changes, // of the occupancy grid's counts; all 0
+    __global ulong *headers, __global float2 *faces,
     __global float4 *media) // straight RGB, extinction per model length
 {
-    const size_t place = get_global_id(0);
-    if (place >= (size_t)width * (size_t)height)
+    const size_t bundle = get_global_id(0);
+    const int wide = (grid.width + BUNDLE - 1) >> BUNDLE_SHIFT;
+    if (bundle >= (size_t)wide * (size_t)((grid.height + BUNDLE - 1) >> BUNDLE_SHIFT))
         return;
-    const int i = (int)(place % (size_t)width), j = (int)(place / (size_t)width);
-    const float per_depth = length_per_depth(centre_ray, i, j, width, height);
-    const Lists lists = {headers, 0, 0, width, height, 0.0f, 0.0f};
-    const List list = list_at(&lists, i, j);
-    const ulong start = starts[place];
-    const int count = (int)(starts[place + 1] - start);
-    for (int n = 0; n < list.count; ++n) {
-        const OFFSET_T entry = entry_of(list, n);
-        const ulong k = start + n;
-        float2 face = NO_FACE; // of what the list is filled up with
-        float3 color = (float3)(0.0f);
-        float extinction = 0.0f;
-        if (n < count) {
-            face = prepared_face(fronts[k], backs[k], depth_origin, nearest);
-            extinction = prepared_extinction(fronts[k], backs[k], optical_depths[k], per_depth);
-            color = vload3(k, colors);
+    const OFFSET_T first = first_of_header(places[bundle]);
+    int lengths[LISTS_PER_BUNDLE], longest = 0;
+    for (int place = 0; place < LISTS_PER_BUNDLE; ++place) {
+        const int i = (int)(bundle % (size_t)wide) * BUNDLE + (place & (BUNDLE - 1));
+        const int j = (int)(bundle / (size_t)wide) * BUNDLE + (place >> BUNDLE_SHIFT);
+        int n = 0;
+        if (i < grid.width && j < grid.height) {
+            const size_t list = (size_t)j * (size_t)grid.width + (size_t)i;
+            const ulong end = starts[list + 1];
+            __global uint *counts = cells_of_list(&grid, list, changes);
+            const float per_depth = length_per_depth(centre_ray, i, j, grid.width, grid.height);
+            for (ulong k = starts[list]; k < end; ++k) {
+                const float4 medium =
+                    colors ? (float4)(vload3(k, colors), optical_depths[k])
+                           : classified(integrals, cells, means[k], spreads[k], steps[k]);
+                if (!colors && !(medium.w > 0.0f))
+                    continue;
+                const float front = fronts[k], back = backs[k];
+                count_supersegment(&grid, front, back, counts);
+                const OFFSET_T entry = first + ((OFFSET_T)n << 2 * LIST_SHIFT) + place;
+                faces[entry] = prepared_face(front, back, depth_origin, nearest);
+                media[entry] =
+                    (float4)(medium.xyz, prepared_extinction(front, back, medium.w, per_depth));
+                ++n;
+            }
         }
-        faces[entry] = face;
-        media[entry] = (float4)(color, extinction);
+        lengths[place] = n;
+        longest = max(longest, n);
     }
+    // One entry beyond, if there is room: rays that meet nothing there weigh what they read with 0
+    const int written = min(longest + 1, count_of_header(places[bundle]));
+    for (int place = 0; place < LISTS_PER_BUNDLE; ++place)
+        for (int n = lengths[place]; n < written; ++n) {
+            const OFFSET_T entry = first + ((OFFSET_T)n << 2 * LIST_SHIFT) + place;
+            faces[entry] = NO_FACE;
+            media[entry] = (float4)(0.0f);
+        }
+    headers[bundle] = (ulong)first | (ulong)longest << FIRST_BITS;
 }
-
+#else
 // Lists of 8-byte supersegments: each begins with its scales. One work-item per list; the hint
 // keeps Intel's compiler from copying lists in vectors, as long as their longest.
 __attribute__((vec_type_hint(float16))) __kernel void prepare_packed(
@@ -97,3 +126,4 @@ __attribute__((vec_type_hint(float16))) __kernel void prepare_packed(
     for (ulong k = begin; k < end; ++k)
         target[LIST_HEADER + k - begin] = stored[k];
 }
+#endif

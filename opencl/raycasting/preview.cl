@@ -7,7 +7,6 @@
 #include "raycasting/first_supersegment.cl"
 #include "raycasting/ray.cl"
 #include "raycasting/stacks.cl"
-#include "lib/pixels.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF
 

@@ -10,7 +10,7 @@
 //                           lists lie near it. LANES is 1
 #include "lib/list_space.cl"
 #include "lib/cropping.cl"
-#include "raycasting/frame.cl"
+#include "raycasting/supersegments.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 typedef struct {

@@ -12,7 +12,6 @@
 // -D PACKED=0, 1          supersegments of 24 bytes, in two arrays; or of 8, in one
 //                         (docs/dev/conventions.md, "Packed supersegments", has the bits)
 #include "lib/list_space.cl"
-#include "raycasting/frame.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 #if PACKED
@@ -35,12 +34,27 @@ typedef struct {
     float depth_step, nearest_offset;
 } Lists;
 
-// What every kernel takes that draws a frame.
+// What every kernel takes that draws a frame (pyvista_vdi/raycasting/scene.py).
+typedef struct {
+    int lists_wide, lists_high;       // window of V_O
+    int width, height;                // window of V_N
+    int planes;                       // to clip to, of the forms
+    float depth_origin;               // world units
+    float cutoff;                     // a ray ends where less transmittance than this is left
+    float first_depth;                // where slab 0 begins, view depth less depth_origin
+    float slabs_per_depth;            // per world unit
+    float depth_step, nearest_offset; // of 8-byte lists: of depth; least in front of the eye
+    uint regions;                     // of cropping that are kept, see lib/cropping.cl
+    int one_list;                     // whether a ray stays in a list
+} Frame;
+
+#define BLOCK 4 // rays along each edge of a block, in which pixels are dealt to work-items
 #define VDI_PARAMETERS                                                                             \
     __global const HEADER_T *headers, __global const ulong *faces, __global const ulong *media,    \
         __global const float *forms,        /* see begin_ray */                                    \
         __global const float *opaque_depth, /* t at which each pixel's ray ends; 0: none does */   \
-        __global const ulong *masks,        /* of the occupancy grid's stacks: occupied slabs */   \
+        __global const ulong                                                                       \
+            *masks, /* of the occupancy grid's stacks: occupied slabs; 0: not skipped */           \
         Frame frame
 #define LISTS_OF(frame)                                                                            \
     {headers,                                                                                      \

@@ -11,7 +11,6 @@
 // the cell after the next).
 //
 #include "volume/march.cl"
-#include "volume/samples.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Steps of one chunk that both kernels walk along, in the same way.
@@ -94,7 +93,7 @@ __kernel void want_bricks(
     __global const uchar *visible, // whether a macrocell holds anything that is not transparent
     const Bricks bricks,
     __global uint *wanted,    // per brick; set to 1
-    __global float4 *samples) // see volume/samples.cl; room for `steps` of each ray
+    __global float4 *samples) // see volume/rays_of_view.cl; room for `steps` of each ray
 {
     const uint item = (uint)get_global_id(0);
     Walk walk;

@@ -18,3 +18,14 @@ inline Rays rays_of_view(const RaysOfView *view, uint first)
     return rays_of_part(first, view->width, view->height, view->first_column, view->columns,
                         view->first_row, view->rows);
 }
+
+// The samples of steps that are taken before they are composited (volume/bricks.cl), of a volume
+// that is on the device brick by brick, are stored for rays in blocks of 16, step by step, so that
+// neighbouring work-items touch neighbouring words.
+#define SAMPLE_LANES 16
+
+// Where the samples of a work-item begin, of which there is room for `held`.
+inline size_t samples_start(uint item, int held)
+{
+    return (size_t)(item / SAMPLE_LANES) * (size_t)held * SAMPLE_LANES + item % SAMPLE_LANES;
+}

@@ -17,8 +17,7 @@ from pyvista_vdi.model.classification import IN_PLACE, Classification
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, as_volume
-from pyvista_vdi.model.options import MediumOptions
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions, SceneOptions
+from pyvista_vdi.model.options import FrameRequest, MediumOptions, RenderOptions, SceneOptions
 from pyvista_vdi.model.types import CameraLike, DeviceLike, ShownLike, VolumeLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
@@ -94,41 +93,43 @@ def render(
     NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
         If there is no device, or it fails.
     """
-    view = Camera.from_any(camera)
-    given: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
-    if look and any(_keeps_values(each) for each in given):
-        # Have a value look the same in all of them: what is not said is of all their ranges
-        ends = {each.value_range for each in given if _keeps_values(each)}
-        if len(ends) > 1 and not look.keys() & {"clim", *IN_PLACE}:
-            look["clim"] = (min(low for low, _ in ends), max(high for _, high in ends))
-        given = [
-            each.classified(**look, device=device) if _keeps_values(each) else each
-            for each in given
-        ]
-        vdi = given if isinstance(vdi, list | tuple) else given[0]
-    elif look:
-        refuse_unknown(look, "render", _names(render))
-    if isinstance(vdi, list | tuple) or model_transforms is not None:
+    view, several = Camera.from_any(camera), isinstance(vdi, list | tuple)
+    shown: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
+    ends = {each.value_range for each in shown if getattr(each, "value_range", None)}
+    if look and not ends:
+        refuse_unknown(look, "render", inspect.signature(render).parameters)
+    # Have a value look the same in all of them: what is not said is of all their ranges
+    if look and len(ends) > 1 and not look.keys() & {"clim", *IN_PLACE}:
+        look["clim"] = (min(low for low, _ in ends), max(high for _, high in ends))
+    for number, each in enumerate(shown if look else ()):
+        if getattr(each, "value_range", None):
+            shown[number] = each.classified(**look, device=device)
+    if several or model_transforms is not None:
         alone = {name: options.pop(name) for name in ("preview_samples", "transmittance_cutoff")}
         for name in RenderOptions(**alone).given:
             raise InvalidArgumentError(f"{name} is for a single VDI: leave it out for several")
         from pyvista_vdi.raycasting.multi_vdi import common_window_size, placed_vdis, render_vdis
 
-        several: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
-        seen = _seen_in_scene(several, view, model_transforms)
+        # Of sets take what is nearest to the view from where they are placed
+        given = list(model_transforms) if np.iterable(model_transforms) else []
+        views = [view] * len(shown)
+        for number, matrix in enumerate(given if len(given) == len(shown) else ()):
+            if _is_of_views(shown[number]):
+                views[number] = view.replace(model_transform=matrix)
+        seen = [_seen(each, place) for each, place in zip(shown, views, strict=True)]
         placed = placed_vdis(seen, view, model_transforms, **options)
         size: Any = common_window_size(placed) if window_size is None else window_size
         return render_vdis(placed, FrameRequest(view, size, RenderOptions(), opaque_depth, device))
-    shown: Any = vdi if _is_of_views(vdi) else as_vdi(vdi)
-    size = shown.picture_size if window_size is None else window_size
+    one: Any = shown[0] if _is_of_views(shown[0]) else as_vdi(shown[0])
+    size = one.picture_size if window_size is None else window_size
     request = FrameRequest(view, size, RenderOptions(**options), opaque_depth, device)
-    if _is_of_views(shown):
+    if _is_of_views(one):
         from pyvista_vdi.raycasting.multi_vdi import blended
 
-        return blended([(as_vdi(part), weight) for part, weight in shown.parts(view)], request)
+        return blended([(as_vdi(part), weight) for part, weight in one.parts(view)], request)
     from pyvista_vdi.raycasting.raycast import render_vdi
 
-    return render_vdi(shown, request)
+    return render_vdi(one, request)
 
 
 @takes(options=SceneOptions)
@@ -167,13 +168,15 @@ def render_depth(
         If there is no device, or it fails.
     """
     view = Camera.from_any(camera)
-    if look and _keeps_values(vdi):
-        vdi = vdi.classified(**look, device=device)  # type: ignore[union-attr]
+    shown: Any = vdi
+    if look and getattr(vdi, "value_range", None):
+        shown = shown.classified(**look, device=device)
     elif look:
-        refuse_unknown(look, "render_depth", _names(render_depth))
-    seen = _seen(vdi, view)
-    size: Any = _picture_size(vdi, seen) if window_size is None else window_size
-    request = FrameRequest(view, size, options.drawn(), opaque_depth, device)
+        refuse_unknown(look, "render_depth", inspect.signature(render_depth).parameters)
+    seen = _seen(shown, view)
+    usual = getattr(shown, "picture_size", seen.picture_size)
+    size: Any = usual if window_size is None else window_size
+    request = FrameRequest(view, size, RenderOptions(**vars(options)), opaque_depth, device)
     from pyvista_vdi.raycasting.raycast import render_first_hits
 
     return render_first_hits(seen, request, FirstHit.of(opacity_threshold, accumulated))
@@ -238,12 +241,13 @@ def pick(
     if kept is not None and look:
         near = kept.classified(**look)
     elif look:
-        refuse_unknown(look, "pick", _names(pick))
+        refuse_unknown(look, "pick", inspect.signature(pick).parameters)
     seen = _seen(near, view)
-    size: Any = _picture_size(vdi, seen) if window_size is None else window_size
+    usual = getattr(vdi, "picture_size", seen.picture_size)
+    size: Any = usual if window_size is None else window_size
     from pyvista_vdi.raycasting.picking import pick_vdi
 
-    request = FrameRequest(view, size, options.drawn(), opaque_depth)
+    request = FrameRequest(view, size, RenderOptions(**vars(options)), opaque_depth)
     return pick_vdi(seen, request, pixel, FirstHit.of(opacity_threshold, accumulated), kept)
 
 
@@ -296,7 +300,7 @@ def render_volume(
         If there is no device, or it fails.
     """
     view, read = Camera.from_any(camera), as_volume(volume, look.scalars, look.preference)
-    drawn = options.drawn()
+    drawn = RenderOptions(**vars(options))
     if not as_flag(early_termination, "early_termination"):
         drawn = drawn.replace(transmittance_cutoff=0.0)
     table = look.transfer_function_of(read)
@@ -312,15 +316,6 @@ def render_volume(
     return raycast_volume(read, table, request, medium)
 
 
-def _names(function: Any) -> list[str]:
-    return [name for name in inspect.signature(function).parameters if name != "look"]
-
-
-def _keeps_values(vdi: Any) -> bool:
-    """Whether a VDI, or what a set has, keeps values, so that a look can be given."""
-    return getattr(vdi, "value_range", None) is not None
-
-
 def _is_of_views(vdi: Any) -> bool:
     """Whether these are VDIs of several views, among which a picture's view chooses."""
     return isinstance(vdi, VDICollection) and vdi.times is None
@@ -329,21 +324,3 @@ def _is_of_views(vdi: Any) -> bool:
 def _seen(vdi: Any, view: Camera) -> VDI:
     """Return the VDI that is shown: of a set that which is nearest to the view."""
     return vdi[vdi.nearest(view)] if _is_of_views(vdi) else as_vdi(vdi)
-
-
-def _seen_in_scene(
-    vdis: Sequence[Any], view: Camera, model_transforms: Sequence[ArrayLike] | None
-) -> list[VDI]:
-    """Return the VDIs of a scene, each seen where its model transform places it."""
-    given = list(model_transforms) if np.iterable(model_transforms) else ()
-    if model_transforms is None or len(given) != len(vdis):  # refused where it is used
-        return [_seen(vdi, view) for vdi in vdis]
-    return [
-        _seen(vdi, view.replace(model_transform=placed)) if _is_of_views(vdi) else as_vdi(vdi)
-        for vdi, placed in zip(vdis, given, strict=True)
-    ]
-
-
-def _picture_size(vdi: Any, seen: VDI) -> tuple[int, int]:
-    """Return the size of pictures: the set's, where there is one."""
-    return vdi.picture_size if _is_of_views(vdi) else seen.picture_size

@@ -94,7 +94,7 @@ def bring_to_host(runtime: Runtime, nbytes: int) -> None:
     known[:] = map(weakref.ref, living)
 
 
-class GrowingLists:
+class GrowingLists(contextlib.AbstractContextManager["GrowingLists"]):
     """A VDI's arrays while slices of lists are written into them, one behind the other.
 
     A device that uses arrays in place writes them in the host's memory. Room for every list at its
@@ -147,9 +147,6 @@ class GrowingLists:
             except BaseException:
                 self._release_targets()
                 raise
-
-    def __enter__(self) -> "GrowingLists":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._release_targets()

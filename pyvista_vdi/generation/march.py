@@ -1,7 +1,7 @@
 """Records of a slice's rays: marched and merged, fitted to the budget, and packed."""
 
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import GridRays, RayLaunch, Variant
 
 
-class Records:
+class Records(AbstractContextManager["Records"]):
     """A ray per list, and the runs of like samples that are recorded along each of a slice's rays.
 
     ``rays`` are marched through the ``window``, all or part of V_O's window of ``size``, which
@@ -100,9 +100,6 @@ class Records:
             "generation/pack_lists.cl", "pack_lists", self.defines, **records, capacity=capacity
         )
 
-    def __enter__(self) -> "Records":
-        return self
-
     def __exit__(self, *_: object) -> None:
         self._buffers.close()
 
@@ -151,7 +148,7 @@ class Chunk(NamedTuple):
     last: bool
 
 
-class March:
+class March(AbstractContextManager["March"]):
     """Marches the rays of slices, a chunk of steps at a time.
 
     ``entering``: the light that enters part of a grid along each ray of the window, 0 to 1.
@@ -197,9 +194,6 @@ class March:
                 counts=records.counts,
             )
             self._buffers = stack.pop_all()
-
-    def __enter__(self) -> "March":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._buffers.close()

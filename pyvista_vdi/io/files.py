@@ -14,7 +14,7 @@ from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.packing import check_precision
+from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import as_path, check_writable, with_suffix
 from pyvista_vdi.registry import FileFormat
@@ -122,8 +122,7 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
     if compressions:
         one_of(compression, f"compression of {path}", compressions)
     check_level(options.get("level"))
-    if options.get("precision") is not None:
-        check_precision(options["precision"])
+    one_of(options.get("precision"), "precision", PRECISIONS, none=True)
 
 
 def _own() -> FileFormat:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.model.checks import check_callback
-
-#: Called with the finished fraction, 0 to 1; work ends where it returns False.
-Progress = Callable[[float], object]
+from pyvista_vdi.model.types import Progress as Progress
 
 
 class Pieces:

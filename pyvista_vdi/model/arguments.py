@@ -15,20 +15,21 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
 from pyvista_vdi.model.options import (
     RECORDS,
     Deferral,
+    DrawingOptions,
     GenerationOptions,
     Option,
     Options,
     QualityTarget,
+    RenderOptions,
     declared,
     entries,
     record,
 )
-from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 
 
 def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) -> None:
     """Raise TypeError for the first argument whose name is not known, and say what is meant."""
-    known = [name for name in known if name != "self"]
+    known = [name for name in known if name not in ("self", "look")]
     options = declared(*RECORDS)
     for name in given:
         if name in known:
@@ -79,12 +80,8 @@ class Settings(_Fields):  # type: ignore[misc]  # noqa: D101 - made of the optio
     def __init__(self, **given: Any) -> None:
         refuse_unknown(given, "Settings", self.declared)
         super().__init__(**given)
-        object.__setattr__(self, "_said", tuple(given))
-
-    @property
-    def said(self) -> dict[str, Any]:
-        """What was given, defaults among it."""
-        return {name: getattr(self, name) for name in self._said}
+        # What was given, defaults among it
+        object.__setattr__(self, "said", {name: getattr(self, name) for name in given})
 
 
 class Raw:
@@ -189,23 +186,28 @@ def records_of(
     ``settings``, where they are among it, say some of them, which are taken by themselves only
     where they are to be ``flat``; ``defaults`` are others than declared.
     """
-    options: dict[str, Option] = {}
-    for each in records:
-        options.update(each.declared)
-    hidden = [name for name, told in options.items() if told.setting]
     settings = given.pop("settings", None)
     if not isinstance(settings, Settings | None):
         raise InvalidArgumentTypeError(f"settings must be a pyvista_vdi.Settings; got {settings!r}")
-    if settings and (without := [name for name in settings.given if name not in hidden]):
-        raise InvalidArgumentError(
-            f"{', '.join(without)} of the settings means nothing to {function}, which has "
-            f"{', '.join(sorted(hidden))}: leave it out"
-        )
-    said = {**(defaults or {}), **(settings.said if settings else {})}
-    for name in options:
-        if name in given and (flat or name not in hidden):
-            said[name] = given.pop(name)
-    return [each.checked(**{n: said[n] for n in each.declared if n in said}) for each in records]
+    said = dict(defaults or {})
+    if settings is not None:
+        known = [name for name, told in declared(*records).items() if told.setting]
+        if without := [name for name in settings.given if name not in known]:
+            raise InvalidArgumentError(
+                f"{', '.join(without)} of the settings means nothing to {function}, which has "
+                f"{', '.join(sorted(known))}: leave it out"
+            )
+        said |= settings.said
+    made = []
+    for each in records:
+        found = {}
+        for name, told in each.declared.items():
+            if name in given and (flat or not told.setting):
+                found[name] = given.pop(name)
+            elif name in said:
+                found[name] = said[name]
+        made.append(each.checked(**found))
+    return made
 
 
 def names_of(*records: Any) -> list[str]:

@@ -16,6 +16,8 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError, Unsuppo
 from pyvista_vdi.model.checks import as_flag, as_float, as_floats, as_vector
 
 Matrix: TypeAlias = NDArray[np.float64]
+#: What is given as a vector, and kept as a tuple.
+Vector: TypeAlias = Sequence[float] | NDArray[Any]
 
 #: Largest width or height of a window, in pixels: four times 16k, far beyond any display.
 MAX_WINDOW_EDGE = 65536
@@ -78,14 +80,14 @@ class Camera:
         parallel to the direction of projection, or ``model_transform`` cannot be inverted.
     """
 
-    position: Any
-    focal_point: Any
-    view_up: Any
+    position: Vector
+    focal_point: Vector
+    view_up: Vector
     _: KW_ONLY
     view_angle: float = 30.0
     parallel_projection: bool = False
     parallel_scale: float = 1.0
-    window_center: Any = (0.0, 0.0)
+    window_center: Vector = (0.0, 0.0)
     use_horizontal_view_angle: bool = False
     model_transform: Any = field(default=None, compare=False, repr=False)
     _transform: bytes = field(init=False, repr=False)
@@ -104,29 +106,13 @@ class Camera:
 
     @classmethod
     def from_any(cls, camera: Any, *, model_transform: ArrayLike | None = None) -> Camera:
-        """Return ``camera`` as a :class:`Camera`.
+        """Return what a user calls a camera as a :class:`Camera`.
 
-        Parameters
-        ----------
-        camera : Camera or vtkCamera or pyvista.Camera or three vectors
-            VTK's cameras are read through their ``Get…`` methods; VTK itself is not imported.
-            Position, focal point and view up are what PyVista's ``camera_position`` has.
-        model_transform : array_like, shape (4, 4), optional
-            Replaces the model transform; by default a ``Camera`` keeps its own and others get the
-            identity (``vtkCamera``'s own model transform is used where it has been set).
-
-        Returns
-        -------
-        Camera
-            The same view.
-
-        Raises
-        ------
-        InvalidCameraError
-            If it is not a camera.
-        UnsupportedError
-            If it has a view shear, an explicit projection, an off-axis projection or a user
-            transform: the optical model has no place for them.
+        It is a Camera, a ``vtkCamera`` or PyVista's, which are read through their ``Get…`` methods,
+        or position, focal point and view up. ``model_transform`` replaces that of a Camera or a
+        ``vtkCamera``, and is the identity by default where there is none. InvalidCameraError if it
+        is no camera, UnsupportedError if it has a view shear, an explicit or off-axis projection or
+        a user transform, for which the optical model has no place.
         """
         if isinstance(camera, Camera):
             given = model_transform is not None
@@ -147,7 +133,7 @@ class Camera:
             "an off-axis projection": camera.GetUseOffAxisProjection(),
             "a user transform": camera.GetUserTransform() or camera.GetUserViewTransform(),
         }
-        if has := [name for name, there in lacking.items() if there]:
+        if has := list(filter(lacking.get, lacking)):
             raise UnsupportedError(
                 f"the camera has {' and '.join(has)}, which a VDI cannot honour: remove it"
             )
@@ -229,27 +215,9 @@ class Camera:
 
         A picture of ``tile_size`` by the new view is the part ``picture[row : row + height,
         column : column + width]`` of this view's picture of ``window_size``: its rays are the
-        same to rounding.
-
-        Parameters
-        ----------
-        window_size : (int, int)
-            Width and height of the whole window in pixels.
-        corner : (int, int)
-            Column and row of the tile's first pixel, from the top left; the tile may reach
-            beyond the window.
-        tile_size : (int, int)
-            Width and height of the tile in pixels.
-
-        Returns
-        -------
-        Camera
-            The same eye and frame with another lens and window centre.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If the sizes are not two whole numbers of pixels each.
+        same to rounding. ``corner``: column and row of the tile's first pixel, from the top left;
+        the tile may reach beyond the window. InvalidArgumentError if the sizes are not two whole
+        numbers of pixels each.
         """
         window = np.array(check_window_size(window_size))
         tile = np.array(check_window_size(tile_size, name="tile_size"))

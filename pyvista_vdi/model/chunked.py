@@ -55,7 +55,7 @@ class ChunkedArray:
                 f"the array's values are packed ({', '.join(said)}): open it by xarray, which "
                 'unpacks them, and give pyvista_vdi.Volume(dataset["name"].data)'
             )
-        self.lazy = source if _library(source) == "dask" else None
+        self.lazy = source if library_of(source) == "dask" else None
         self._array = source
         self._index = tuple(index) if index is not None else (slice(None),) * 3
         if self.lazy is not None and index is not None:
@@ -69,7 +69,7 @@ class ChunkedArray:
                 "colours, Volume(numpy.asarray(array))"
             )
         file = _file_of(source)
-        self.source = f"the {_library(source)} array of shape {tuple(source.shape)}"
+        self.source = f"the {library_of(source)} array of shape {tuple(source.shape)}"
         self.source += f" in {file}" if file else ""
         if any(math.isnan(n) for n in self._array.shape):
             raise InvalidVolumeError(
@@ -154,27 +154,25 @@ class ChunkedArray:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, _array=opened(state["_array"]))
 
-    def __repr__(self) -> str:
-        return f"ChunkedArray({self.source}, {self.shape} {self.dtype}, chunks={self.chunks})"
 
-
-def _library(thing: Any) -> str:
+def library_of(thing: Any) -> str:
+    """Return the name of the package that made a thing."""
     return type(thing).__module__.partition(".")[0]
 
 
 def _file_of(array: Any) -> Path | None:
     """Return an array's file, or its folder, if it is in any here."""
-    if _library(array) == "h5py":
+    if library_of(array) == "h5py":
         return Path(array.file.filename).absolute()
     # A local store has its folder as `root` in zarr 3, and as `path` in zarr 2 and by fsspec
     store = getattr(array, "store", None)
     root = Path(str(getattr(store, "root", None) or getattr(store, "path", None)))
-    return root / array.path if _library(array) == "zarr" and root.is_dir() else None
+    return root / array.path if library_of(array) == "zarr" and root.is_dir() else None
 
 
 def closed(array: Any) -> Any:
     """Return what is pickled in place of an array: an HDF5 file's is opened again."""
-    if _library(array) == "h5py":
+    if library_of(array) == "h5py":
         return os.path.abspath(array.file.filename), array.name  # noqa: PTH100 - no links
     return array
 
@@ -185,15 +183,6 @@ def opened(array: Any) -> Any:
         return array
     path, name = array
     return importlib.import_module("h5py").File(path, "r")[name]
-
-
-def is_chunked(array: Any) -> bool:
-    """Whether an array is one that is read chunk by chunk, by who made it."""
-    return isinstance(array, ChunkedArray) or (
-        not isinstance(array, np.ndarray)
-        and _library(array) in ("dask", "zarr", "h5py")
-        and all(hasattr(array, name) for name in ("shape", "dtype", "chunks"))
-    )
 
 
 def voxel_type(dtype: Any) -> np.dtype[Any]:

@@ -63,8 +63,16 @@ class Described(Options):
     """Options of which metadata tell those that are given."""
 
     def describe(self) -> dict[str, Any]:
-        """Return what differs from the defaults, in values that JSON can hold."""
-        return {name: _plain(value) for name, value in self.given.items()}
+        """Return what differs from the defaults; what JSON cannot hold as a short description."""
+        found = {}
+        for name, given in self.given.items():
+            value = given.to_dict() if isinstance(given, TransferFunction) else given
+            value = value.tolist() if hasattr(value, "tolist") else value
+            try:
+                found[name] = json.loads(json.dumps(value, allow_nan=False))
+            except (TypeError, ValueError):
+                found[name] = getattr(value, "name", None) or type(value).__name__
+        return found
 
 
 @record
@@ -180,16 +188,10 @@ class Classification(Look, ArrayChoice):
     def require_no_look(self) -> None:
         """Refuse a look where values are kept to be classified afterwards."""
         given = {*self.given} & {*Look.declared, *IN_PLACE} - {"interpolation"}
-        if "shade" in given:
-            raise UnsupportedError(
-                "shade=True needs the volume's gradients, which a deferred VDI does not keep: "
-                "leave shade out, or classification='deferred'"
-            )
         if given:
-            names = ", ".join(sorted(given))
             raise InvalidArgumentError(
-                f"classification='deferred' keeps values, whatever their look: give {names} to "
-                "classified() of what is returned"
+                "classification='deferred' keeps values, whatever their look, and no gradients to "
+                f"shade by: give {', '.join(sorted(given))} to classified() of what is returned"
             )
 
     def transfer_function_of(self, volume: Volume) -> TransferFunction:
@@ -223,15 +225,3 @@ class Classification(Look, ArrayChoice):
         scalars = volume.array if volume.rgba else np.array(volume.finite_range())
         built: TransferFunction = from_arguments(scalars, rgba=volume.rgba, **arguments)
         return built
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as JSON can hold it; what it cannot hold as its short description."""
-    if isinstance(value, TransferFunction):
-        return value.to_dict()
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    try:
-        return json.loads(json.dumps(value, allow_nan=False))
-    except (TypeError, ValueError):
-        return getattr(value, "name", None) or type(value).__name__

@@ -88,23 +88,11 @@ class Cropping:
 
     @classmethod
     def from_any(cls, cropping: Any) -> Cropping | None:
-        """Return what a user calls cropping.
+        """Return what a user calls cropping; ``None`` where nothing is cropped.
 
-        Parameters
-        ----------
-        cropping : None, Cropping, vtkVolumeMapper, sequence of six numbers, or a pair
-            A mapper's own cropping, which may be off, as VTK's GPU mapper cuts the image at its
-            input; the planes of a sub-volume; or the planes and the regions.
-
-        Returns
-        -------
-        Cropping or None
-            ``None`` where nothing is cropped.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is none of these.
+        It is None, a Cropping, the planes of a sub-volume, six numbers, or a pair of planes and
+        regions, or a mapper, whose cropping may be off, and has the planes as VTK's GPU mapper cuts
+        the image at its input. InvalidArgumentError if it is none of these.
         """
         if cropping is None or isinstance(cropping, Cropping):
             return cropping

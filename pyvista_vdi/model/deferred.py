@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVDIError
-from pyvista_vdi.model.checks import as_number, as_range
-from pyvista_vdi.model.packing import check_precision
+from pyvista_vdi.model.checks import as_number, as_range, one_of
+from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.vdi import VDI, Lists, lengths_of, made_vdi
 
 Floats = NDArray[np.float64]
@@ -124,7 +124,7 @@ class DeferredVDI(Lists):
         In 8 bytes depths have 14 bits of the list's extent, the mean 3825 steps over the range of
         values, the spread 4 significant bits and the share 8 bits.
         """
-        if check_precision(precision) == self.precision:
+        if one_of(precision, "precision", PRECISIONS) == self.precision:
             return self
         lists = self.lists
         mean = self.mean.astype(np.float64)

@@ -66,16 +66,6 @@ def summation(media: float) -> int:
     return 0 if media <= MANY_MEDIA else 1 if media <= VERY_MANY_MEDIA else 2
 
 
-def enters_far_away(reach: float, points: int) -> bool:
-    """Whether kernels that march need positions of two floats: ``-D DOUBLE_FLOAT_RAYS``.
-
-    ``reach`` is the largest grid coordinate of a ray between the depths of the volume's bounds, and
-    ``points`` the number of grid points along its longest axis.
-    """
-    farthest = min(max(NEAR_ENTRY, ENTRY_PER_POINT * points), FAR_ENTRY)
-    return reach > farthest
-
-
 def lists_are_far(depth: float, thickness: float, extent: float) -> bool:
     """Whether depths in lists need be relative to each ray (``-D DOUBLE_FLOAT_RAYS``).
 

@@ -160,16 +160,9 @@ class Lights:
     def from_any(cls, lights: Any) -> Lights:
         """Return what a user calls lights.
 
-        Parameters
-        ----------
-        lights : None, Lights, vtkRenderer, or iterable of Light or vtkLight
-            ``None`` is one headlight. Of a renderer, the lights that are switched on are taken as
-            they are now, and a headlight where none is on, which is what VTK would make.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is something else.
+        ``None`` is one headlight. Of a renderer, the lights that are switched on are taken as they
+        are now, and a headlight where none is on, which is what VTK would make; else it is Lights,
+        or an iterable of Light or ``vtkLight``. InvalidArgumentError if it is something else.
         """
         if lights is None:
             return cls()

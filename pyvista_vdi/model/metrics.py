@@ -64,16 +64,11 @@ def over_background(
         pixels = np.asarray(image)
     except ValueError:  # lists of different lengths
         pixels = np.empty(0)
-    floats = pixels.dtype.kind == "f" and pixels.size
+    floats = pixels.dtype.kind == "f" and pixels.size and np.isfinite(pixels).all()
     if not floats or pixels.ndim != 3 or pixels.shape[2] not in (3, 4):
         raise InvalidArgumentError(
-            "an image is an array of floats of shape (height, width, 4), premultiplied RGBA, or "
-            f"(height, width, 3), RGB; got {pixels.dtype} of shape {pixels.shape}"
-        )
-    if not np.isfinite(pixels).all():
-        row, column = np.argwhere(~np.isfinite(pixels).all(axis=2))[0]
-        raise InvalidArgumentError(
-            f"the image is not finite: pixel (column {column}, row {row}) is {pixels[row, column]}"
+            "an image is an array of finite floats of shape (height, width, 4), premultiplied "
+            f"RGBA, or (height, width, 3), RGB; got {pixels.dtype} of shape {pixels.shape}"
         )
     behind = check_background(background)
     rgb = pixels[..., :3].astype(np.float64)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.host_memory import aligned_empty
 
 #: What a supersegment takes: 24 bytes as it was made, or less.
@@ -129,11 +128,6 @@ class Packed8:
         """Return what codes of depth in some lists stand for, world units less the origin."""
         whole = self.origins[lists] + codes.view(np.int32) * self.strides[lists].astype(np.int32)
         return whole.astype(np.float32) * np.float32(self.step)
-
-
-def check_precision(precision: object) -> str:
-    """Return one of :data:`PRECISIONS`, or raise InvalidArgumentError."""
-    return one_of(precision, "precision", PRECISIONS)
 
 
 def packing_of(arrays: Arrays, nearest: float) -> Packed8:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from dataclasses import KW_ONLY, asdict, dataclass, replace
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
-from pyvista_vdi.model.checks import Number, as_range, one_of
+from pyvista_vdi.model.checks import Number, as_floats, as_range, one_of
 from pyvista_vdi.model.lighting import Shading
 
 #: Optical depth that a fully opaque sample gets per step: exp(-30) is 1e-13, nothing passes.
@@ -100,18 +101,14 @@ class TransferFunction:
             raise InvalidArgumentError(
                 f"shading must be a pyvista_vdi.Shading; got {type(self.shading).__name__}"
             )
-        if (self.gradient_opacities is None) != (self.gradient_range is None):
-            raise InvalidArgumentError(
-                "gradient_opacities and gradient_range belong together: give both or neither"
-            )
-        if self.gradient_opacities is not None:
+        if self.gradient_opacities is not None or self.gradient_range is not None:
+            factors = _table("gradient_opacities", self.gradient_opacities, ())
             low, high = as_range(self.gradient_range)
             if not (np.isfinite(low) and np.isfinite(high) and 0 <= low < high):
                 raise InvalidArgumentError(
-                    "gradient_range must be two magnitudes, 0 <= low < high; got "
-                    f"{self.gradient_range!r}"
+                    "gradient_range must be the two magnitudes of gradient_opacities, "
+                    f"0 <= low < high; got {self.gradient_range!r}"
                 )
-            factors = _table("gradient_opacities", self.gradient_opacities, ())
             put(self, "gradient_opacities", factors)
             put(self, "gradient_range", (low, high))
 
@@ -135,10 +132,7 @@ class TransferFunction:
     def from_dict(cls, state: dict[str, Any]) -> TransferFunction:
         """Return the transfer function that :meth:`to_dict` described.
 
-        Raises
-        ------
-        InvalidArgumentError
-            If it is no such description, or a value is out of range.
+        InvalidArgumentError if it is no such description, or a value is out of range.
         """
         try:
             arguments = dict(state)
@@ -172,18 +166,14 @@ class TransferFunction:
 
 
 def _table(name: str, values: ArrayLike, item: tuple[int, ...]) -> NDArray[np.float32]:
-    try:
-        with np.errstate(over="ignore"):  # infinite then, and refused for its value
-            table = np.array(values, dtype=np.float32)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidArgumentError(f"{name} must be numbers; got {values!r}") from error
-    if table.ndim != 1 + len(item) or table.shape[1:] != item or len(table) == 0:
-        wanted = f"(n, {item[0]})" if item else "(n,)"
-        raise InvalidArgumentError(f"{name} must have shape {wanted}; got {table.shape}")
-    if not ((table >= 0) & (table <= 1)).all():
+    with np.errstate(over="ignore"):  # infinite then, and refused for its value
+        table = as_floats(values).astype(np.float32)
+    shaped = table.ndim == 1 + len(item) and table.shape[1:] == item and len(table) > 0
+    if not shaped or not ((table >= 0) & (table <= 1)).all():
+        ends = f", from {table.min()} to {table.max()}" if table.size else ""
         raise InvalidArgumentError(
-            f"{name} must lie between 0 and 1; got {np.nanmin(table)} to {np.nanmax(table)}"
-            + (" and NaN" if np.isnan(table).any() else "")
+            f"{name} must be numbers from 0 to 1, of shape {'(n, 3)' if item else '(n,)'}; got "
+            f"{reprlib.repr(values)}, of shape {table.shape}{ends}"
         )
     table.setflags(write=False)
     return table

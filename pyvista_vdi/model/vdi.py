@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, VDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_bounds, as_number, as_whole
-from pyvista_vdi.model.packing import Arrays, Packed8, check_precision, lengths_of_lists, packing_of
+from pyvista_vdi.model.checks import as_bounds, as_number, as_whole, one_of
+from pyvista_vdi.model.packing import PRECISIONS, Arrays, Packed8, lengths_of_lists, packing_of
 
 if TYPE_CHECKING:
     import os
@@ -268,7 +268,7 @@ class VDI(Lists):
         InvalidArgumentError
             If there is no such precision, or a list is too long for 8 bytes (above 16383).
         """
-        if check_precision(precision) == self.precision:
+        if one_of(precision, "precision", PRECISIONS) == self.precision:
             return self
         exact = precision == "exact"
         return made_vdi(self.arrays if exact else packing_of(self.arrays, _nearest(self)), self)

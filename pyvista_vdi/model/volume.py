@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
 from pyvista_vdi.model.checks import as_floats, as_vector
-from pyvista_vdi.model.chunked import ChunkedArray, held, is_chunked
+from pyvista_vdi.model.chunked import ChunkedArray, held, library_of
 from pyvista_vdi.model.host_memory import require_host_memory
 
 
@@ -122,10 +122,7 @@ class Volume(Grid):
         name: str = "values",
         blanked: NDArray[np.uint8] | None = None,
     ) -> None:
-        if isinstance(array, ChunkedArray):
-            self.array: Any = array
-        else:
-            self.array = ChunkedArray(array) if is_chunked(array) else _checked_array(array)
+        self.array = _checked_array(array)
         self.chunked = isinstance(self.array, ChunkedArray)
         self.rgba = self.array.ndim == 4
         nz, ny, nx = self.array.shape[:3]
@@ -204,10 +201,7 @@ class Volume(Grid):
     def load(self, *cameras: Any, window_size: Sequence[int] = (1, 1)) -> Volume:
         """Return the volume in memory, of several levels the one that views require.
 
-        Raises
-        ------
-        DeviceMemoryError
-            If it is read chunk by chunk, and the host has not so much memory free.
+        DeviceMemoryError if it is read chunk by chunk, and the host has not so much memory free.
         """
         found = self.in_view(*cameras, window_size=window_size) if cameras else self
         if not found.chunked:
@@ -225,13 +219,7 @@ class Volume(Grid):
         return self.array[..., 3] if self.rgba else self.array
 
     def finite_range(self) -> tuple[float, float]:
-        """Return the smallest and the largest scalar, NaN left out.
-
-        Raises
-        ------
-        InvalidVolumeError
-            If every value is NaN.
-        """
+        """Return the least and the largest scalar, NaN left out; InvalidVolumeError if all are."""
         low, high = self._range
         if np.isnan(low):
             raise InvalidVolumeError(
@@ -255,7 +243,12 @@ class Volume(Grid):
         return f"Volume({nx} x {ny} x {nz} {kind}, spacing={self.spacing})"
 
 
-def _checked_array(values: ArrayLike) -> NDArray[np.generic]:
+def _checked_array(values: Any) -> Any:
+    """Return an array as a volume holds it: in memory, or read chunk by chunk."""
+    if isinstance(values, ChunkedArray):
+        return values
+    if library_of(values) in ("dask", "zarr", "h5py") and hasattr(values, "chunks"):
+        return ChunkedArray(values)
     try:
         array = np.asarray(values)
     except (TypeError, ValueError) as error:  # lists of different lengths

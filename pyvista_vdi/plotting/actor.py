@@ -114,8 +114,12 @@ class PlotterVDIActor(VDIActorMethods, Volume):
             copied = type(prop)()  # an actor without its volume has a plain vtkVolumeProperty
             copied.DeepCopy(prop)
             mapper.lookup_table = _copied(self.mapper.lookup_table)
-            if getattr(prop, "_lookup_table", None) is self.mapper.lookup_table:
-                copied._lookup_table = mapper.lookup_table  # followed from now on, as by PyVista
+            if isinstance(prop, pv.VolumeProperty) and prop.GetColorChannels() == 3:
+                # The table is followed from now on, as by PyVista, but what is there is shown
+                color, opacity = copied.GetRGBTransferFunction(), copied.GetScalarOpacity()
+                copied.apply_lookup_table(mapper.lookup_table)
+                copied.SetColor(color)
+                copied.SetScalarOpacity(opacity)
             other.SetProperty(copied)
         return other
 

@@ -262,7 +262,7 @@ def _better(seen: Seen, made: Made) -> RenderMode:
     return seen.costs.better(made.angle, made.pixels, seconds, ssim, bound)
 
 
-def lacking(seen: Made, cone: float, remedy: str) -> list[tuple[str, str]]:
+def lacking(seen: Made, cone: float) -> list[tuple[str, str]]:
     """Return what a VDI without its volume lacks where it is seen from: causes and warnings.
 
     ``cone`` degrees about its generating view are what it was to serve.
@@ -278,5 +278,5 @@ def lacking(seen: Made, cone: float, remedy: str) -> list[tuple[str, str]]:
     if seen.magnification > _TOO_COARSE:
         what = f"{seen.magnification:.1f} pixels of the view are as wide as one of the VDI's "
         found.append(("magnification", f"{what}lists: it shows no finer detail"))
-    end = f"{remedy}; regenerate='never' takes this as it is"
+    end = "make one of this view of the volume; regenerate='never' takes this as it is"
     return [(cause, f"{what}; {end}") for cause, what in found]

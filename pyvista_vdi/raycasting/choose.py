@@ -14,7 +14,7 @@ _RAYCAST = "raycasting/raycast.cl", "raycast"
 
 
 @dataclass(frozen=True)
-class Variant:
+class ChosenKernel:
     """A kernel that draws a scene, by its file and name, and how it is launched.
 
     ``switches`` are its ``-D`` options, eight at most. ``items`` are its work-items, each of which
@@ -32,7 +32,7 @@ class Variant:
     whole: bool = False
 
 
-def choose(device: Runtime, scene: Scene) -> Variant:
+def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     """Return the variant that draws a scene on a device: of the first row that fits.
 
     ==========  =====================================================  ========================
@@ -43,7 +43,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     segments    elsewhere                                              ``segments``
     first hits  everywhere                                             ``first_hits``
     a picture   CPU; V_O's view, a list for each pixel; not cropped    ``raycast_aligned_view``
-    a picture   V_O's view, but for cropped ones that blocks can draw  ``raycast``, ONE_LIST=1
+    a picture   V_O's view, but for cropped ones that blocks can draw  ``raycast``, one_list
     a picture   CPU; rays have many lists in common; not cropped       ``raycast_packets``
     a picture   CPU; lists suit blocks                                 ``raycast``, LANES=16
     a picture   all else                                               ``raycast``
@@ -57,10 +57,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     lists = prepared.switches  # OFFSET_T, DEPTH, PACKED; DOUBLE_FLOAT_RAYS where it is needed
     compensated = summation(options.preview_samples or prepared.most_media)
     sums: dict[str, int | str] = {"COMPENSATED": compensated}
-    walk: dict[str, int | str] = {
-        "CROPPED": int(bool(scene.cropped.forms)),
-        "SKIP_EMPTY": int(options.skip_empty and prepared.occupancy.worthwhile),
-    }
+    walk: dict[str, int | str] = {"CROPPED": int(bool(scene.cropped.forms))}
     double_float, cropped = prepared.double_float, walk["CROPPED"]
     suit_blocks = not double_float and not prepared.long_offsets
 
@@ -68,7 +65,7 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         switches = {**lists, **sums, "CROPPED": cropped}
         counts = {"counts": prepared.occupancy.counts, "samples": options.preview_samples}
         items = block_items(*scene.size)
-        return Variant(
+        return ChosenKernel(
             ("raycasting/preview.cl", "preview"), switches, items, GROUP, counts, whole=True
         )
 
@@ -76,23 +73,23 @@ def choose(device: Runtime, scene: Scene) -> Variant:
     if scene.segments:
         lanes = LANES if device.is_cpu and suit_blocks else 1
         switches = {**lists, **walk, "LANES": lanes}
-        return Variant(
+        return ChosenKernel(
             ("multi_vdi/segments.cl", "segments"), switches, 0, GROUP // lanes, {}, lanes
         )
 
     def by_columns(
         kernel: tuple[str, str], switches: Mapping[str, int | str], rays: int = 1, **own: Any
-    ) -> Variant:
+    ) -> ChosenKernel:
         """Return the variant that draws the scene's part in strips, column by column."""
         columns = part_columns(scene.part)
         items = COLUMN_ITEMS * int(columns[2]) * int(columns[3])
         own = {"part": columns, **own}
-        return Variant(kernel, switches, items // rays, COLUMN_ITEMS // rays, own, rays)
+        return ChosenKernel(kernel, switches, items // rays, COLUMN_ITEMS // rays, own, rays)
 
     if scene.hit is not None:
         return by_columns(
             ("raycasting/first_hits.cl", "first_hits"),
-            {**lists, **walk, "ONE_LIST": int(scene.one_list)},
+            {**lists, **walk},
             least_optical_depth=scene.hit.optical_depth,
             accumulated=int(scene.hit.accumulated),
         )
@@ -105,19 +102,19 @@ def choose(device: Runtime, scene: Scene) -> Variant:
         kernel = "raycasting/aligned_view.cl", "raycast_aligned_view"
         own = {"origin": scene.aligned.origin}
         items = scene.aligned.items
-        return Variant(kernel, {**lists, **sums}, items, LANES, own, LANES, whole=True)
+        return ChosenKernel(kernel, {**lists, **sums}, items, LANES, own, LANES, whole=True)
     # Each ray is still in one list: the kernel for single rays has a loop along it. Cropped rays
     # are followed in blocks where they can be
     if scene.one_list and not (cropped and in_blocks):
-        return by_columns(_RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 1})
+        return by_columns(_RAYCAST, {**lists, **walk, **sums, "LANES": 1})
 
     # Rays that have many lists in common
     packets = scene.packets if uncropped else None
     if packets is not None:
-        ways = {"UPRIGHT": int(packets.upright), "SWEEP_V": int(packets.sweep_v)}
-        switches = {**lists, **sums, **ways, "SKIP_EMPTY": walk["SKIP_EMPTY"]}
+        switches = {**lists, **sums}
         across: dict[str, Any] = {"epipole": packets.epipole, "part": packets.part}
-        return Variant(
+        across |= {"upright": packets.upright, "sweep_v": packets.sweep_v}
+        return ChosenKernel(
             ("raycasting/packets.cl", "raycast_packets"),
             switches,
             packets.items,
@@ -126,13 +123,13 @@ def choose(device: Runtime, scene: Scene) -> Variant:
             LANES,
         )
     lanes = LANES if in_blocks else 1
-    switches = {**lists, **walk, **sums, "ONE_LIST": 0, "LANES": lanes}
+    switches = {**lists, **walk, **sums, "LANES": lanes}
     return by_columns(_RAYCAST, switches, lanes)
 
 
-def choose_merge(device: Runtime, scenes: Sequence[Scene]) -> Variant:
+def choose_merge(device: Runtime, scenes: Sequence[Scene]) -> ChosenKernel:
     """Return the variant that merges what rays cross of several VDIs."""
     compensated = summation(sum(scene.prepared.most_media for scene in scenes))
     lanes = LANES if device.is_cpu and compensated < 2 else 1
     switches = {"STREAMS": len(scenes), "COMPENSATED": compensated, "LANES": lanes}
-    return Variant(("multi_vdi/merge.cl", "merge"), switches, 0, GROUP // lanes, {}, lanes)
+    return ChosenKernel(("multi_vdi/merge.cl", "merge"), switches, 0, GROUP // lanes, {}, lanes)

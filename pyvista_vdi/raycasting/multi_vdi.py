@@ -21,8 +21,8 @@ from pyvista_vdi.device import DeviceBuffer, Launch, Runtime, get_runtime, padde
 from pyvista_vdi.device.constants import CELL, CELL_ITEMS, GROUP, SEGMENT_SIZE, SPARE_SLOTS
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.model.ray_forms import Rectangle, pixels_of_points
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose, choose_merge
 from pyvista_vdi.raycasting.prepared import prepared_vdi
@@ -203,14 +203,14 @@ def owned_image(
     are given.
     """
     runtime = get_runtime(request.device)
-    scenes = [
-        Scene.of(
-            prepared_vdi(runtime, one.vdi),
-            request.replace(camera=one.camera, options=_merged(one.options)),
-            segments=True,
+    scenes = []
+    for one in placed:
+        # All end at the same transmittance
+        options = one.options.replace(
+            transmittance_cutoff=TRANSMITTANCE_CUTOFF, preview_samples=None
         )
-        for one in placed
-    ]
+        own = request.replace(camera=one.camera, options=options)
+        scenes.append(Scene.of(prepared_vdi(runtime, one.vdi), own, segments=True))
     order = canonical_order(placed, [scene.reference_depth for scene in scenes])
     width, height = request.size
     cells = _Cells.of(scenes, request.size)
@@ -226,11 +226,6 @@ def owned_image(
             for one in placed:
                 _slots[one.vdi] = math.ceil(_SPARE_SLOTS * max(needed, 1))
         return OwnedImage(runtime.download(image), runtime.download(owner))
-
-
-def _merged(options: RenderOptions) -> RenderOptions:
-    """Return the options of a VDI that is merged with others: all end at the same transmittance."""
-    return options.replace(transmittance_cutoff=TRANSMITTANCE_CUTOFF, preview_samples=None)
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,10 @@ _ARRAYS = {
     "optical_depths": "optical depths",
 }
 _COUNTED = ("starts", "fronts", "backs")
+#: What media are made of: colours and optical depths, or a deferred VDI's values.
+_NO_MEDIA = dict.fromkeys(
+    ("colors", "optical_depths", "means", "spreads", "steps", "integrals"), None
+) | {"cells": 0}
 
 
 class OccupancyGrid:
@@ -215,14 +219,9 @@ class PreparedVDI:
         self.packed = vdi.packing is not None
         centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
         with kept_together() as keep:
-            self._common = {
-                "width": self.window[0],
-                "height": self.window[1],
-                #: Direction of a centre ray per unit of view depth, model frame
-                "centre_ray": keep(
-                    runtime.upload(centre.astype(np.float32), "centre rays", brief=True)
-                ),
-            }
+            #: Direction of a centre ray per unit of view depth, model frame.
+            centres = runtime.upload(centre.astype(np.float32), "centre rays", brief=True)
+            self._centre = keep(centres)
             self._prepare(vdi, keep)
 
     @property
@@ -249,7 +248,6 @@ class PreparedVDI:
     def _prepare(self, vdi: VDI, keep: Callable[[DeviceBuffer], DeviceBuffer]) -> None:
         """Bring the lists to the device, exact or packed, and build the occupancy grid."""
         runtime, packing = self.runtime, vdi.packing
-        per_list = padded(self.window[0] * self.window[1], GROUP)
         with contextlib.ExitStack() as stack:
 
             def upload(array: NDArray[Any], name: str) -> DeviceBuffer:
@@ -282,35 +280,73 @@ class PreparedVDI:
                 ends = self._place_bundles(held, keep)
             self._tell_double_float(ends)
 
-            def count(**grid: Any) -> None:
-                lists = held if packing else {name: held[name] for name in _COUNTED}
-                kernel = "count_packed" if packing else "count_supersegments"
-                counting = runtime.bind("raycasting/occupancy.cl", kernel, **lists)
-                counting(per_list, GROUP, **grid)
-
-            self.occupancy = OccupancyGrid(self, count)
-            keep(self.occupancy.counts), keep(self.occupancy.masks)
-
-            # Prepare: depth coordinates and extinctions by bundles, or lists behind their scales. A
-            # CPU writes them in our own memory, which systems give in large pages, a driver's in
-            # small ones
-            arguments: dict[str, Any] = {**self._common, **held, "headers": self.headers}
-            if packing is not None:
-                self.faces = self.media = keep(
-                    runtime.result((max(1, self._entries), 2), np.uint32, "supersegments")
-                )
-                arguments |= {"stored": held["words"], "words": self.faces}
+            if packing is None:
+                self._prepare_lists(held, self.headers, keep)
             else:
-                self.faces = keep(runtime.result((self._entries, 2), name="supersegment faces"))
-                self.media = keep(runtime.result((self._entries, 4), name="supersegment media"))
-                arguments |= {"depth_origin": self.depth_origin, "nearest": self.nearest}
-                arguments |= {"faces": self.faces, "media": self.media}
-            kernel = "prepare_packed" if packing is not None else "prepare_lists"
-            prepare = runtime.bind("raycasting/prepare.cl", kernel, self.switches, **arguments)
-            prepare(per_list, GROUP)
+                self._prepare_packed(held, keep)
             runtime.finish()  # the buffers above may be host memory in use
         if runtime.is_cpu:
             self.lit = share_lit(vdi, *self.depths)
+
+    def _prepare_packed(
+        self, held: dict[str, Any], keep: Callable[[DeviceBuffer], DeviceBuffer]
+    ) -> None:
+        """Prepare lists of 8-byte supersegments behind their scales, and count them."""
+        runtime, (width, height) = self.runtime, self.window
+        per_list = padded(width * height, GROUP)
+
+        def count(**grid: Any) -> None:
+            counting = runtime.bind("raycasting/occupancy.cl", "count_packed", **held)
+            counting(per_list, GROUP, **grid)
+
+        self.occupancy = OccupancyGrid(self, count)
+        keep(self.occupancy.counts), keep(self.occupancy.masks)
+        self.faces = self.media = keep(
+            runtime.result((max(1, self._entries), 2), np.uint32, "supersegments")
+        )
+        stored = {"stored" if name == "words" else name: each for name, each in held.items()}
+        window = {"width": width, "height": height, "centre_ray": self._centre}
+        written = {"headers": self.headers, "words": self.faces}
+        prepare = runtime.bind(
+            *("raycasting/prepare.cl", "prepare_packed", self.switches),
+            **{**stored, **window, **written},
+        )
+        prepare(per_list, GROUP)
+
+    def _prepare_lists(
+        self,
+        arrays: dict[str, Any],
+        places: DeviceBuffer,
+        keep: Callable[[DeviceBuffer], DeviceBuffer],
+    ) -> None:
+        """Prepare exact lists, and count them in the occupancy grid.
+
+        ``places``: headers of the bundles with all supersegments that ``arrays`` have.
+        """
+        runtime, bundles = self.runtime, self.headers.shape[0]
+        # A CPU writes them in our own memory, which systems give in large pages, a driver's in
+        # small ones
+        self.faces = keep(runtime.result((self._entries, 2), name="supersegment faces"))
+        self.media = keep(runtime.result((self._entries, 4), name="supersegment media"))
+        prepare = runtime.bind(
+            "raycasting/prepare.cl",
+            "prepare_lists",
+            self.switches,
+            **{**_NO_MEDIA, **arrays},
+            places=places,
+            centre_ray=self._centre,
+            depth_origin=self.depth_origin,
+            nearest=self.nearest,
+            headers=self.headers,
+            faces=self.faces,
+            media=self.media,
+        )
+
+        def count(**grid: Any) -> None:
+            prepare(padded(bundles, GROUP), GROUP, **grid)
+
+        self.occupancy = OccupancyGrid(self, count)
+        keep(self.occupancy.counts), keep(self.occupancy.masks)
 
     def _place_bundles(
         self, held: Mapping[str, Any], keep: Callable[[DeviceBuffer], DeviceBuffer]
@@ -417,30 +453,8 @@ class KeptValues(PreparedVDI):
             runtime.upload(look.integrals, "integrals of a transfer function") as table,
         ):
             shown.headers = keep(runtime.result((bundles,), np.uint64, "list headers"))
-            shown.faces = keep(runtime.result((self._entries, 2), name="supersegment faces"))
-            shown.media = keep(runtime.result((self._entries, 4), name="supersegment media"))
-            prepare = runtime.bind(
-                "raycasting/prepare_values.cl",
-                "prepare_values",
-                self.switches,
-                **self._faces,
-                **self.values,
-                places=self.headers,
-                centre_ray=self._common["centre_ray"],
-                integrals=table,
-                cells=CELLS,
-                depth_origin=self.depth_origin,
-                nearest=self.nearest,
-                headers=shown.headers,
-                faces=shown.faces,
-                media=shown.media,
-            )
-
-            def count(**grid: Any) -> None:
-                prepare(padded(bundles, GROUP), GROUP, **grid)
-
-            shown.occupancy = OccupancyGrid(shown, count)
-            keep(shown.occupancy.counts), keep(shown.occupancy.masks)
+            media = {**self.values, "integrals": table, "cells": CELLS}
+            shown._prepare_lists({**self._faces, **media}, self.headers, keep)
         return shown
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, get_runtime, padded
+from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.model.ray_forms import reference_depth
-from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose
 from pyvista_vdi.raycasting.picking import FirstHit
@@ -67,9 +67,10 @@ def enqueue(scene: Scene, arguments: dict[str, Any], image: DeviceBuffer) -> Non
     variant = choose(runtime, scene)
     pixels = scene.size[0] * scene.size[1]
     if not variant.whole and scene.only is None and scene.part.pixels < pixels:
-        clear = "clear_image" if scene.hit is None else "clear_hits"
-        cleared = runtime.bind("raycasting/clear.cl", clear, pixels=pixels, image=image)
-        cleared(padded(pixels, _CLEARING_GROUP), _CLEARING_GROUP)
+        nothing, numbers = (0.0, 4 * pixels) if scene.hit is None else (np.inf, pixels)
+        items = padded(numbers, _CLEARING_GROUP)
+        cleared = runtime.bind("raycasting/clear.cl", "clear_image", image=image)
+        cleared(items, _CLEARING_GROUP, numbers=numbers, nothing=nothing)
     launch = runtime.bind(
         *variant.kernel, variant.switches, **arguments, **variant.arguments, image=image
     )

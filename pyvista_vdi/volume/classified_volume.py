@@ -82,7 +82,7 @@ class DeviceVolume:
         room: Room | None = None,
         **changes: Any,
     ) -> None:
-        options = MediumOptions.of(options, changes)
+        options = replace(options or MediumOptions(), **changes)
         if not isinstance(volume, Volume):
             raise InvalidArgumentError(f"expected a Volume, got {type(volume).__name__}")
         if not isinstance(transfer_function, TransferFunction):

@@ -15,9 +15,9 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
-from pyvista_vdi.model.float32_limits import MOST_STEPS, enters_far_away
+from pyvista_vdi.model.float32_limits import ENTRY_PER_POINT, FAR_ENTRY, MOST_STEPS, NEAR_ENTRY
+from pyvista_vdi.model.options import Planes
 from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed
-from pyvista_vdi.model.render_options import Planes
 from pyvista_vdi.model.volume import Grid
 
 Ends = tuple[float, float, float]
@@ -74,17 +74,17 @@ class GridRays:
     ) -> MarchForms:
         """Return what the kernels march along in a view."""
         pixel_rays = rays.pixel_rays(camera, window_size, self.grid.bounds)
-        to_index = rays.inverse_affine(self.grid.index_to_model)
+        to_index, points = rays.inverse_affine(self.grid.index_to_model), self.grid.dimensions
         index = [pixel_rays.form(row[:3], row[3]) for row in to_index[:3]]
         direction = [pixel_rays.form(axis) for axis in np.eye(3)]
         planes = []
-        for form, points in zip(index, self.grid.dimensions, strict=True):
+        for form, n in zip(index, points, strict=True):
             far = -form
-            far[0] += points - 1
+            far[0] += n - 1
             planes += [form, far]
         planes += rays.view_planes(camera, pixel_rays, clipping_planes)
         reach = rays.largest_value(camera, window_size, self.grid.bounds, index)
-        two_floats = enters_far_away(reach, max(self.grid.dimensions))
+        two_floats = reach > min(max(NEAR_ENTRY, ENTRY_PER_POINT * max(points)), FAR_ENTRY)
         return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), two_floats)
 
     def view(
@@ -137,10 +137,10 @@ class Variant:
     scalar, or colours and a scalar (1 or 4 ``components``); whether the ``nearest`` point is
     sampled, and the medium of its scalar looked up (``by_scalar``). Samples are not lit, lit, or
     lit by one headlight and nothing else (``shaded`` 0, 1, 2); opacity may depend on the gradient;
-    voxels may be ``part`` of a grid; what cropping keeps may be no box (``cropped``). With
-    ``double_float``, rays enter the volume so far from where they are formed that float32 does not
-    hold it. ``compensated``: how sums along a ray are kept (``lib/compositing.cl``). ``sharp``, no
-    ``-D`` option: a specular power is so large that cosines round it off.
+    voxels may be ``part`` of a grid. With ``double_float``, rays enter the volume so far from where
+    they are formed that float32 does not hold it. ``compensated``: how sums along a ray are kept
+    (``lib/compositing.cl``). ``sharp``, no ``-D`` option: a specular power is so large that cosines
+    round it off.
     """
 
     voxel: str = "uchar"
@@ -153,7 +153,6 @@ class Variant:
     part: bool = False
     double_float: bool = False
     compensated: int = 0
-    cropped: bool = False
     sharp: bool = False
 
     @cached_property
@@ -170,7 +169,6 @@ class Variant:
             "GRID_PART": self.part,
             "DOUBLE_FLOAT_RAYS": self.double_float,
             "COMPENSATED": self.compensated,
-            "CROPPED": self.cropped,
         }
 
     @property

@@ -36,6 +36,7 @@ def test_images_and_vdis_pass_through_it(runtime, monkeypatch):
     volume = field_volume()
     vdi = generate_vdi(volume, view(volume), WINDOW, transfer(), device=runtime)
     render_vdi(vdi, view(volume), device=runtime)
+    assert len(vdi.front)  # on a GPU lists are there until they are asked for
     assert seen >= {
         "image",
         "front depths",

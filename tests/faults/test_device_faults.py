@@ -30,6 +30,7 @@ VDI = {
     *("occupancy counts", "occupancy masks"),
 }
 SMALL = {"transfer function", "visible macrocells"}
+# Of a VDI that the error's frames hold: a GPU keeps them
 LISTS = {"list offsets", "front depths", "back depths", "supersegment colours", "optical depths"}
 
 every_operation = pytest.mark.parametrize(

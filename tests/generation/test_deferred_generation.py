@@ -96,7 +96,7 @@ def test_generate_returns_one_and_bakes_by_default(runtime):
     ("asked", "error", "says"),
     [
         ({"cmap": "bone"}, InvalidArgumentError, "give cmap to classified"),
-        ({"shade": True}, UnsupportedError, "shade"),
+        ({"shade": True}, InvalidArgumentError, "shade"),
         ({"ambient_occlusion": True}, UnsupportedError, "ambient_occlusion"),
         ({"quality": "fast"}, UnsupportedError, "give max_supersegments"),
         ({"blending": "maximum"}, UnsupportedError, "blending"),

@@ -188,7 +188,7 @@ def test_numpy(tmp_path):
 # Pictures
 
 
-@pytest.mark.parametrize("name", ["a.nii.gz", "a.mha", "a.nrrd", "a.npy", "a.tif"])
+@pytest.mark.parametrize("name", ["a.nii.gz", "a.mha", "a.nrrd", "a.gipl", "a.npy", "a.tif"])
 def test_what_is_cut_off_is_refused(name, tmp_path, capfd):
     sitk, image = itk_image(scan())
     path = tmp_path / name
@@ -222,9 +222,9 @@ def test_what_cannot_be_opened_is_said(tmp_path):
         pvdi.read_volume(tmp_path / "a.npy")
 
 
-@pytest.mark.parametrize("name", ["a.fits", "a.raw", "IM0001"])
+@pytest.mark.parametrize("name", ["a.fits", "a.raw", "IM0001", "run.pvd"])
 def test_what_is_not_read_is_refused_with_the_remedy(name, tmp_path):
-    (tmp_path / name).write_bytes(bytes(2000))
+    (tmp_path / name).write_bytes(b"<VTKFile" + bytes(2000))
     with pytest.raises(
         UnsupportedError, match=r"own library, .*Volume\(array, spacing=, origin=\)"
     ):

@@ -29,11 +29,12 @@ RUNS = {
     "files": "--volumes brain --repeats 1",
     "frames": "--volumes brain --repeats 1",
     "generation": "--volumes brain --repeats 1",
-    "large": "--volumes brain --large kingsnake_like@8 --repeats 1",
     "paper": "--volumes kingsnake_like@16 --sizes 64x36 --repeats 1",
     "scaling": "--volume brain --repeats 1",
-    "trees": "--other .. --volumes brain --repeats 1",
+    "trees": "--switch 'no prefetch' --volumes brain --repeats 1",
 }
+#: Questions for a GPU, which are tried on whatever there is.
+QUESTIONS = ("calls", "plotter", "sharing")
 
 
 @pytest.mark.parametrize(
@@ -70,3 +71,13 @@ def test_a_script_runs_to_its_end(name, tmp_path, default_runtime):
     assert found["rows"]
     assert not [row for row in found["rows"] if "refused" in row]
     assert "Measured from" in (tmp_path / f"{name}_sample.md").read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_what_is_asked_on_a_gpu_is_answered(question, default_runtime):
+    command = [sys.executable, "on_gpu.py", question, "--size", "48x27", "--repeats", "1"]
+    done = subprocess.run(command, cwd=BENCHMARKS, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("\n") > 2

@@ -19,11 +19,11 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.packing import DEPTH_CODES
-from pyvista_vdi.model.render_options import (
+from pyvista_vdi.model.options import (
     MAX_PREVIEW_SAMPLES,
     RenderOptions,
 )
+from pyvista_vdi.model.packing import DEPTH_CODES
 
 pytestmark = pytest.mark.fast
 
@@ -115,12 +115,12 @@ REFUSED = {
     ],
     TransferFunction: [
         ({"opacities": [0.5]}, "as many opacities as colors; got 1 and 2"),
-        ({"opacities": [[0, 1]]}, r"opacities must have shape \(n,\); got \(1, 2\)"),
-        ({"opacities": [0, 1.5]}, "opacities must lie between 0 and 1; got 0.0 to 1.5"),
-        ({"opacities": [NAN, 1]}, "opacities must lie between 0 and 1; .* and NaN"),
-        ({"opacities": ["thick", "thin"]}, "opacities must be numbers"),
-        ({"colors": [[0, 0, 0, 1]] * 2}, r"colors must have shape \(n, 3\); got \(2, 4\)"),
-        ({"colors": [[0, 0, 255]] * 2}, "colors must lie between 0 and 1; got 0.0 to 255.0"),
+        ({"opacities": [[0, 1]]}, r"opacities .* of shape \(n,\); got .* of shape \(1, 2\)"),
+        ({"opacities": [0, 1.5]}, r"opacities must be numbers from 0 to 1.* from 0.0 to 1.5"),
+        ({"opacities": [NAN, 1]}, "opacities must be numbers from 0 to 1.* from nan to nan"),
+        ({"opacities": ["thick", "thin"]}, "opacities must be numbers.*thick"),
+        ({"colors": [[0, 0, 0, 1]] * 2}, r"colors .* of shape \(n, 3\); got .* of shape \(2, 4\)"),
+        ({"colors": [[0, 0, 255]] * 2}, "colors must be numbers from 0 to 1.* from 0.0 to 255.0"),
         ({"scalar_range": (3, 1)}, r"\(clim\) must be two finite numbers, the smaller first"),
         ({"scalar_range": (0, INF)}, "must be two finite numbers"),
         ({"scalar_range": ("a", "b")}, "must be two finite numbers"),
@@ -210,7 +210,7 @@ REFUSED = {
         ((PICTURE, PICTURE[:, 1:]), "different sizes, 32 x 24 and 31 x 24"),
         ((PICTURE.astype(np.uint8), PICTURE), "got uint8 of shape"),
         ((PICTURE[0], PICTURE), r"got float64 of shape \(32, 3\)"),
-        ((PICTURE * NAN, PICTURE), r"not finite: pixel \(column 0, row 0\)"),
+        ((PICTURE * NAN, PICTURE), "finite floats"),
     ],
 }
 

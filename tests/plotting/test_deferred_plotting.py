@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import warnings
 
 import numpy as np
 import pytest
@@ -66,24 +65,6 @@ def test_a_file_takes_a_look_and_its_picture_is_that_of_the_classified_vdi(
     plotter.remove_actor(actor)
     plotter.add_vdi(kept.classified(**look), show_scalar_bar=False)
     assert np.abs(picture - seen(plotter)).max() <= 1
-
-
-@pytest.mark.parametrize(
-    "as_series", [False, pytest.param(True, marks=pytest.mark.extension("series"))]
-)
-def test_what_is_shown_but_not_kept_is_warned_of_once(default_runtime, plotter, as_series):
-    deferred = {"classification": "deferred", "value_range": (50, 200)}
-    shown, kept = volume(), deferred
-    if as_series:
-        one = pvdi.generate(shown, plotter.camera, (48, 36), **deferred)
-        shown, kept = pvdi.VDISeries([one]), {}
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        plotter.add_vdi(shown, cmap="bone", **kept)
-        seen(plotter)
-    assert [str(each.message)[:43] for each in said] == [
-        "the transfer function shows values outside "
-    ]
 
 
 def test_picks_and_the_vdi_have_the_look_of_now(default_runtime, plotter):

@@ -111,7 +111,6 @@ def test_limits_are_kept_and_what_cannot_be_is_said(default_runtime, ladder):
         ({"full_fps": math.inf}, "full_fps must be"),
         ({"max_bytes": -1}, "max_bytes must be a whole number of bytes above 0; got -1"),
         ({"quality": "fast", "target_ssim": 0.9}, "both say how good pictures are to be"),
-        ({"quality": "reference", "max_bytes": 10}, "'reference' is what is made without a dial"),
         ({"quality": "fast", "max_supersegments": 7}, "'fast' chooses .* max_supersegments=7"),
         ({"target_ssim": 0.9, "window": (160, 10)}, "160 x 10 pixels has no SSIM"),
     ],

@@ -165,7 +165,7 @@ def test_fails(plotter, monkeypatch):
     making = background.generate_vdi
     monkeypatch.setattr(background, "generate_vdi", fail)
     actor.mapper.lookup_table.cmap = "inferno"
-    with pytest.warns(VDIWarning, match="cannot be made anew: DeviceError: no more") as said:
+    with pytest.warns(VDIWarning, match="cannot be made: DeviceError: no more") as said:
         frames_until(plotter, lambda: said)
     frames(plotter, 3)  # warnings are errors: it is not said again
     assert len(tries) == 1

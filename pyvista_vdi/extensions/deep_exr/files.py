@@ -99,9 +99,9 @@ def _deep_image(path: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         ) from error
     if len(deep) != 1:
         raise VDIFileError(
-            f"{path} has {len(deep)} deep images that can be read, and a VDI is one: a file that is "
-            "cut off has none, nor has a flat image, which says nothing about depth; take one of "
-            "several out by oiiotool in.exr --subimage 0 -o out.exr"
+            f"{path} has {len(deep)} deep images that can be read, and a VDI is one: a file that "
+            "is cut off has none, nor has a flat image, which says nothing about depth; take one "
+            "of several out by oiiotool in.exr --subimage 0 -o out.exr"
         )
     return deep[0]
 

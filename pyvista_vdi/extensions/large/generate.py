@@ -18,7 +18,7 @@ from pyvista_vdi.errors import (
     MissingDependencyError,
 )
 from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, cuts_of
-from pyvista_vdi.extensions.large.passes import Piece, Rows, Seen, Task
+from pyvista_vdi.extensions.large.passes import BlockSummary, Piece, Rows, Task
 from pyvista_vdi.generation.generate import made_from, report
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.packing import Arrays
@@ -89,7 +89,7 @@ def _generated(request: GenerationRequest, task: Task, workers: Any) -> VDI:
     order = task.to_read(windows)
     values = dict(zip(order, workers.values(map(blocks.own, order)), strict=True))
     first = workers.map("first-pass", task.first_pass, order, order, values.values(), share=0.4)
-    seen = workers.results(workers.map("seen", Seen.without_faces, order, first.values()))
+    seen = workers.results(workers.map("seen", BlockSummary.without_faces, order, first.values()))
     entering = task.light_entering(windows, seen)
 
     # Make the lists of each block in which something may be seen

@@ -49,7 +49,7 @@ Rows = tuple[NDArray[Any], ...]
 _DARK = 80.0
 
 
-class Seen(NamedTuple):
+class BlockSummary(NamedTuple):
     """What the first pass finds of a block."""
 
     #: Least and largest scalar of what each neighbour needs, and by (0, 0, 0) of all own points;
@@ -61,7 +61,7 @@ class Seen(NamedTuple):
     #: block is transparent
     depths: NDArray[np.float16] | None = None
 
-    def without_faces(self) -> Seen:
+    def without_faces(self) -> BlockSummary:
         """Return what whoever sums up the light needs."""
         return self._replace(faces={})
 
@@ -116,7 +116,7 @@ class Task:
             request.camera,
             request.window_size,
             request.transfer_function.replace(unit_distance=unit),
-            GenerationOptions.of(options, {"sample_distance": step}),
+            replace(options, sample_distance=step),
             scalar_range,
             rays,
             request.device,
@@ -140,12 +140,12 @@ class Task:
             wanted.update(self.blocks.neighbours(block).values())
         return [block for block in order if block in wanted]
 
-    def first_pass(self, block: Indices, values: Values | Callable[[], Values]) -> Seen:
+    def first_pass(self, block: Indices, values: Values | Callable[[], Values]) -> BlockSummary:
         """Find the optical depths of a block's rays, without its neighbours' points."""
         own = values() if callable(values) else values
         faces = self.blocks.faces(own)
         ends = {at: ends_of(part) for at, part in {(0, 0, 0): own, **faces}.items()}
-        seen, window = Seen(ends, faces), self.window(block)
+        seen, window = BlockSummary(ends, faces), self.window(block)
         if not window.pixels or not self.may_be_visible(*ends[0, 0, 0]):
             return seen
         with self._medium(block, own, lit=False) as medium:
@@ -153,7 +153,7 @@ class Task:
         return seen._replace(depths=depths.astype(np.float16)) if depths.any() else seen
 
     def light_entering(
-        self, windows: Windows, seen: Mapping[Indices, Seen]
+        self, windows: Windows, seen: Mapping[Indices, BlockSummary]
     ) -> dict[Indices, NDArray[np.float16]]:
         """Return the light that enters each block that may be seen, along its window's rays.
 
@@ -181,7 +181,7 @@ class Task:
         block: Indices,
         values: Values | Callable[[], Values],
         light: NDArray[np.float16],
-        *around: Seen | None,
+        *around: BlockSummary | None,
     ) -> Piece:
         """Make the lists of a block's rays.
 

@@ -209,10 +209,6 @@ class SeriesInput(SeveralInput):
         """Call this when it begins to play; ``None`` ends it."""
         self._changed = changed
 
-    def complaint(self, error: BaseException) -> str:
-        """Return that a step is left out."""
-        return f"a step is left out: {type(error).__name__}: {error}"
-
     def play(
         self, rate: float = RATE, *, loop: bool = True, memory_limit: int | None = None
     ) -> None:

@@ -20,7 +20,6 @@ class SetInput(SeveralInput):
     """
 
     collection: VDISet
-    remedy = "generate a set with more views, or with views of this kind"
     ahead = 8
 
     def __init__(self, vdi_set: VDISet) -> None:

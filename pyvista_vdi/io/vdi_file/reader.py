@@ -38,17 +38,18 @@ from pyvista_vdi.io.vdi_file.layout import (
     number,
 )
 from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.packing import (
     DEPTH_CODES,
     GRID,
     LEAST_STEP_EXPONENT,
+    PRECISIONS,
     TAU_CODES,
     Arrays,
     Codes,
     Packed8,
-    check_precision,
 )
 from pyvista_vdi.model.vdi import VDI, made_vdi
 
@@ -256,7 +257,8 @@ class _OpenFile:
             if d["chunk_rows"] != CHUNK_ROWS:
                 self._refuse(f"chunk_rows is {d['chunk_rows']!r}, not {CHUNK_ROWS}")
             n_lists = window_size[0] * window_size[1]
-            precision = check_precision(d["precision"]) if d["version"] >= 3 else "exact"
+            precision = d["precision"] if d["version"] >= 3 else "exact"
+            one_of(precision, "precision", PRECISIONS)
             packed_bytes = {"exact": 0, "8-byte": 8 * n + 6 * n_lists}
             return FileInfo(
                 path=self._path,

@@ -115,10 +115,11 @@ def _volume(path: Path, slices: list[Any], name: str) -> VolumeInFile:
     if any(
         not np.array_equal(one.spacing, first.spacing)
         or not np.allclose(one.turn, first.turn, atol=1e-3)
+        or (one.header.Rows, one.header.Columns) != (first.header.Rows, first.header.Columns)
         for one in slices
     ):
         raise InvalidVolumeError(
-            f"{what} are turned against each other, or have pixels of several sizes: {_APART}"
+            f"{what} are turned against each other, or are of several sizes: {_APART}"
         )
     along, down = first.turn.reshape(2, 3)
     slices.sort(key=lambda one: one.position @ np.cross(along, down))
@@ -147,22 +148,8 @@ def _stack(slices: list[Any]) -> Lazy:
             why = f"({' '.join(str(error).split())}): write it anew, uncompressed"
             raise InvalidVolumeError(f"{slices[i].file} cannot be read as a slice {why}") from error
 
-    first = one(0)
-
-    def read_all() -> NDArray[Any]:
-        array = np.empty((len(slices), *first.shape), first.dtype)
-        for i in range(len(slices)):
-            values = one(i)
-            if values.shape != first.shape:
-                raise InvalidVolumeError(
-                    f"{slices[i].file} has {values.shape} pixels, and {slices[0].file} "
-                    f"{first.shape}: the slices of a volume have one size"
-                )
-            array = array.astype(np.promote_types(array.dtype, values.dtype), copy=False)
-            array[i] = values
-        return array
-
-    return Lazy((len(slices), *first.shape), first.dtype, read_all)
+    first, count = one(0), len(slices)
+    return Lazy((count, *first.shape), first.dtype, lambda: np.stack([*map(one, range(count))]))
 
 
 def _values(one: Any, decoded: Callable[[Path], NDArray[Any]]) -> NDArray[Any]:

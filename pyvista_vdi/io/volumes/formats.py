@@ -61,8 +61,21 @@ def _by_itk(file: Path) -> tuple[NDArray[Any], str, NDArray[np.float64]]:
 
 def itk(file: Path) -> list[VolumeInFile]:
     """Return the volume of a MetaImage, in ITK's frame, or of a GIPL or MINC file, in its own."""
+    array, axes, place = _by_itk(file)
+    if ".gipl" in file.name.lower():  # 256 bytes of header; the others ITK checks
+        _require_whole(file, 256 + array.nbytes)
     unit = "" if file.suffix.lower() in (".mha", ".mhd") else "mm"
-    return [VolumeInFile(*_by_itk(file), unit=unit)]
+    return [VolumeInFile(array, axes, place, unit=unit)]
+
+
+def _require_whole(file: Path, needed: int) -> None:
+    """Refuse what ITK would fill up with whatever memory holds, or gzip's checksum refuses."""
+    with file.open("rb") as plain:
+        packed = plain.read(2) == b"\x1f\x8b"
+    with gzip.open(file) if packed else file.open("rb") as stream:
+        size = sum(map(len, iter(partial(stream.read, 1 << 24), b"")))
+    if size < needed:
+        raise ValueError(f"it has {size} of {needed} bytes: it is cut off")
 
 
 def nifti(file: Path) -> list[VolumeInFile]:
@@ -72,15 +85,8 @@ def nifti(file: Path) -> list[VolumeInFile]:
     order = "<" if head[:4] == b"\x5c\x01\0\0" else ">"
     real, short = (partial(np.frombuffer, head, f"{order}{kind}") for kind in ("f4", "i2"))
     n, *counts = short(8, 40).tolist()
-    # Refuse values that ITK would fill up with zeros, or that gzip's checksum refuses
     needed = int(real(1, 108)[0]) + np.prod(counts[:n], dtype=object) * int(short(1, 72)[0]) // 8
-    values = file.with_name(re.sub(r"(?i)\.hdr(?=$|\.)", ".img", file.name))
-    with values.open("rb") as plain:
-        packed = plain.read(2) == b"\x1f\x8b"
-    with gzip.open(values) if packed else values.open("rb") as stream:
-        size = sum(map(len, iter(partial(stream.read, 1 << 24), b"")))
-    if size < needed:
-        raise ValueError(f"it has {size} of {needed} bytes: it is cut off")
+    _require_whole(file.with_name(re.sub(r"(?i)\.hdr(?=$|\.)", ".img", file.name)), needed)
     slope, shift = real(2, 112)
     if shift and np.isfinite(shift) and not (slope and np.isfinite(slope)):
         array = array - array.dtype.type(shift)  # which ITK adds where values are not scaled

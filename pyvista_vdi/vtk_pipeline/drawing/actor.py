@@ -10,8 +10,9 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
-from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refusing
+from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refuse
 from pyvista_vdi.vtk_pipeline.drawing.screen import place_image, show_image
+from pyvista_vdi.vtk_pipeline.filters.inputs import input_of
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import (
@@ -21,7 +22,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (
 )
 
 
-@refusing(OF_ACTORS)
 class VDIActorMethods:
     """What makes a volume show a VDI; mixed into VTK's and into PyVista's."""
 
@@ -127,12 +127,12 @@ class VDIActorMethods:
         VDIError
             What generating raises.
         """
-        mapper = self.GetMapper()
-        return None if mapper is None else mapper.driver.vdi_asked_for()  # type: ignore[no-any-return]
+        return self._driver.vdi_asked_for()  # type: ignore[no-any-return]
 
     @vdi.setter
     def vdi(self: Any, vdi: VDI | VDICollection) -> None:
-        self._mapper().SetVDI(vdi)
+        self._driver.set_input(input_of(vdi))
+        self.GetMapper().Modified()
 
     @property
     def deferred(self: Any) -> DeferredVDI | None:
@@ -140,14 +140,12 @@ class VDIActorMethods:
 
         Of a series they are those of the step that is shown.
         """
-        mapper = self.GetMapper()
-        return None if mapper is None else mapper.driver.values_asked_for()  # type: ignore[no-any-return]
+        return self._driver.values_asked_for()  # type: ignore[no-any-return]
 
     @property
     def collection(self: Any) -> VDICollection | None:
         """The series or set that is shown; ``None`` where a single VDI or a volume is."""
-        mapper = self.GetMapper()
-        shown = None if mapper is None else mapper.driver.input
+        shown = self._driver.input
         return None if shown is None else shown.collection
 
     @property
@@ -157,34 +155,32 @@ class VDIActorMethods:
         ``None`` where no series is shown. See
         :class:`pyvista_vdi.extensions.series.shown.SeriesInput`.
         """
-        mapper = self.GetMapper()
-        shown = None if mapper is None else mapper.driver.input
+        shown = self._driver.input
         return None if shown is None else shown.player
 
-    def _mapper(self: Any) -> Any:
-        """Return the mapper; InvalidArgumentError without one."""
+    @property
+    def _driver(self: Any) -> Any:
+        """What draws; InvalidArgumentError without a mapper."""
         mapper = self.GetMapper()
         if mapper is None:
             raise InvalidArgumentError("this actor has no mapper: set a VDIMapper (SetMapper)")
-        return mapper
+        return mapper.driver
 
     @property
     def status(self: Any) -> VDIStatus:
         """How the VDI was drawn in the last frame, and what goes on behind it."""
-        mapper = self._mapper()
-        return mapper.driver.status()  # type: ignore[no-any-return]
+        return self._driver.status()  # type: ignore[no-any-return]
 
     @property
     def opacity_multiplier(self: Any) -> float:
         """Factor of the extinction, 1 by default: see :meth:`VDIMapper.SetOpacityMultiplier`."""
-        mapper = self.GetMapper()
-        return 1.0 if mapper is None else mapper.GetOpacityMultiplier()
+        return self._driver.settings.opacity_multiplier  # type: ignore[no-any-return]
 
     @opacity_multiplier.setter
     def opacity_multiplier(self: Any, multiplier: float) -> None:
-        self._mapper().SetOpacityMultiplier(multiplier)
+        self.GetMapper().SetOpacityMultiplier(multiplier)
 
-    def pick(self: Any, x: float, y: float, *, renderer: Any = None) -> Pick | None:
+    def pick(self: Any, x: float, y: float) -> Pick | None:
         """Return the supersegment that is seen at a place of the window.
 
         Parameters
@@ -192,8 +188,6 @@ class VDIActorMethods:
         x, y : float
             Display coordinates: pixels of the window from its lower left corner, as in VTK's
             events and pickers.
-        renderer : vtkRenderer or pyvista.Plotter, optional
-            Which one, where renderers overlap; by default the one that shows the actor there.
 
         Returns
         -------
@@ -208,17 +202,13 @@ class VDIActorMethods:
         InvalidArgumentError
             If no renderer of a window shows the actor.
         """
-        mapper = self.GetMapper()
-        shown = [] if mapper is None else mapper.driver.renderers
-        shown = [r for r in shown if r.GetRenderWindow() is not None]
+        shown = [r for r in self._driver.renderers if r.GetRenderWindow() is not None]
         if not shown:
             raise InvalidArgumentError(
                 "nothing shows this actor yet: add it to a renderer of a window first"
             )
-        if renderer is not None:
-            shown = [r for r in shown if r is getattr(renderer, "renderer", renderer)]
         there = [r for r in shown if r.IsInViewport(int(x), int(y))]
-        return mapper.driver.pick(there[0], x, y) if there else None
+        return self._driver.pick(there[0], x, y) if there else None  # type: ignore[no-any-return]
 
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
         """Generate the VDI anew, now.
@@ -253,7 +243,7 @@ class VDIActorMethods:
         driver = mapper.driver
         driver.drop()
         driver.failed = ()
-        driver.warnings.said.clear()
+        driver.said.clear()
         matrix = as_array(self.GetMatrix())
         renderer, shown = driver.renderer(), driver.input
         shown.note_scene(driver.renderers, matrix)
@@ -270,6 +260,9 @@ class VDIActorMethods:
     def camera_to_come(self, renderer: Any) -> Any:
         """Return the ``vtkCamera`` of a renderer's next picture."""
         return camera_to_come(renderer)
+
+
+refuse(VDIActorMethods, OF_ACTORS)
 
 
 class VDIActor(VDIActorMethods, vtkVolume):

@@ -16,7 +16,7 @@ import numpy as np
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidVolumeError, VDIError
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.model.view import coverage
 from pyvista_vdi.quality.plan import SETTLED
 from pyvista_vdi.quality.rate import FLOOR, reduced
@@ -29,7 +29,7 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Matrix, tiled, viewpor
 from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Drawn, raycast
 from pyvista_vdi.vtk_pipeline.drawing.overlap import group_of
 from pyvista_vdi.vtk_pipeline.drawing.planner import Planner
-from pyvista_vdi.vtk_pipeline.drawing.screen import ImageTexture, NoDepth, place_image
+from pyvista_vdi.vtk_pipeline.drawing.screen import ImageTexture, NoDepth, place_image, show_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.interaction.timer import PERIOD, Timer
@@ -107,7 +107,7 @@ class Driver(Planner):
         """Raycast and upload the image for the frame that has just begun."""
         actor, renderer = self.actor(), self.renderer()
         if renderer is None or not _is_drawing(renderer):
-            self.warnings.warn(
+            self.warn(
                 "VDIMapper draws only behind its own VDIActor: use VDIActor in place of vtkVolume, "
                 "also for copies (VDIActor().ShallowCopy(actor))"
             )
@@ -116,13 +116,14 @@ class Driver(Planner):
         components = 1 if actor.GetProperty().GetIndependentComponents() else 4
         if self.box.components != components:
             self.box.give_components(components)
-        frame = Frame.current(renderer, actor, mapper)
-        if frame is None:  # beside the tile of a picture that is drawn
+        frame = self._guarded(Frame.current, renderer, actor, mapper)
+        if frame is None:  # or beside the tile of a picture that is drawn
             return
         window, vtk_window = frame.window, renderer.GetRenderWindow()
         self._window = weakref.ref(window)
         # A selection draws numbers where the last frame showed something
         if renderer.GetSelector() is None:
+            show_image(actor, renderer)
             with suppress(VDIError):  # which what is drawn says
                 self.box.Update()
             self._last = self._guarded(self._paint, frame) or self._last
@@ -215,7 +216,7 @@ class Driver(Planner):
         Never raises. What is out of the picture is not brought up to date.
         """
 
-        def in_picture(_: Any) -> Frame | None:
+        def in_picture() -> Frame | None:
             bounds = None if self.input is None else self.input.bounds()
             frame = Frame.current(renderer, self.actor(), mapper, matrix)
             if bounds is None or frame is None or frame.rectangle(bounds) is None:
@@ -224,7 +225,7 @@ class Driver(Planner):
             seen = self._seen_in(frame)
             return None if seen is None or seen.volume is not None else seen
 
-        return self._guarded(in_picture, None)  # type: ignore[no-any-return]
+        return self._guarded(in_picture)  # type: ignore[no-any-return]
 
     # Between frames
 
@@ -249,10 +250,10 @@ class Driver(Planner):
 
     # Errors in a frame
 
-    def _guarded(self, draw: Callable[[Any], Any], frame: Any) -> Any:
+    def _guarded(self, draw: Callable[..., Any], *of: Any) -> Any:
         """Return what a part of drawing returns, or ``None`` and say what went wrong."""
         try:
-            return draw(frame)
+            return draw(*of)
         except (Exception, KeyboardInterrupt) as error:  # VTK would swallow it
             if isinstance(error, InvalidVolumeError):  # as VTK's mappers: there is nothing to see
                 self._last = NOTHING
@@ -264,7 +265,7 @@ class Driver(Planner):
                     "generating the VDI was interrupted: what was shown stays; call "
                     "actor.regenerate() to try again"
                 )
-            self.warnings.warn(message, error)
+            self.warn(message, error)
             # Without the frames that it came from, which hold buffers
             self.trouble = error.with_traceback(None)
             error.__cause__ = error.__context__ = None

@@ -13,8 +13,8 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
-from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refusing
-from pyvista_vdi.vtk_pipeline.drawing.settings import with_settings
+from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refuse
+from pyvista_vdi.vtk_pipeline.drawing.settings import add_settings
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
@@ -34,8 +34,6 @@ def _on_end(mapper: Any, event: str) -> None:
     mapper.driver.box.end()
 
 
-@with_settings
-@refusing(OF_MAPPERS)
 class VDIMapperMethods:
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
@@ -128,6 +126,16 @@ class VDIMapperMethods:
         """Return the device as it was set."""
         return self.driver.device
 
+    # VTK's own switch would draw its volume into a smaller framebuffer
+
+    def AutoAdjustSampleDistancesOn(self: Any) -> None:
+        """Draw previews."""
+        self.SetAutoAdjustSampleDistances(True)
+
+    def AutoAdjustSampleDistancesOff(self: Any) -> None:
+        """Draw every frame in full."""
+        self.SetAutoAdjustSampleDistances(False)
+
     def ShallowCopy(self: Any, other: Any) -> None:
         """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.
 
@@ -160,6 +168,10 @@ class VDIMapperMethods:
     def _set_input(self: Any, source: Input | None) -> None:
         self.driver.set_input(source)
         self.Modified()
+
+
+refuse(VDIMapperMethods, OF_MAPPERS)
+add_settings(VDIMapperMethods)
 
 
 class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):

@@ -8,16 +8,22 @@ from __future__ import annotations
 import logging
 import math
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pyvista_vdi.device import Runtime
-from pyvista_vdi.errors import Cancelled, InvalidVolumeError, VDIError
+from pyvista_vdi.errors import (
+    Cancelled,
+    InvalidVolumeError,
+    VDIError,
+    VDIWarning,
+    warn_external,
+)
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.render_options import RenderOptions
+from pyvista_vdi.model.options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View, coverage
 from pyvista_vdi.quality.background import BackgroundThread, Job, vdi_job
@@ -35,7 +41,6 @@ from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, size_of
-from pyvista_vdi.vtk_pipeline.interaction.status import Warnings
 from pyvista_vdi.vtk_pipeline.interaction.window import now
 
 _log = logging.getLogger(__name__)
@@ -61,7 +66,7 @@ class Planner:
         self.settings = MapperSettings()
         self.device: Any = None
         self.input: Input | None = None
-        self.warnings = Warnings()
+        self.said: set[Hashable] = set()  # warnings, or their causes
         self.failed: tuple[Any, ...] = ()  # stamps at which a VDI could not be made
         self.worker = BackgroundThread("pyvista-vdi generation")
         # The thread knows the worker alone, so that this can be collected while it works
@@ -126,7 +131,14 @@ class Planner:
                     _log.debug("the volume cannot be drawn itself", exc_info=unable)
                     kind: Any = "none" if planned.in_bricks or seen.volume != "whole" else "bricks"
                     self._refused = (planned.content, kind)
-                    seen = replace(seen, first_look=False, volume=kind, **self._going_on())
+                    seen = replace(
+                        seen,
+                        first_look=False,
+                        volume=kind,
+                        making=self.making,
+                        estimating=self._asked is not None and self.making is None,
+                        failed=self._stamp in self.failed,
+                    )
         except Cancelled as error:
             if self._volume is None and source.last() is None:
                 raise
@@ -153,23 +165,13 @@ class Planner:
         if self.settings.regenerate == "auto":
             cone = vdi.metadata.get("view_cone")
             cone = cone if isinstance(cone, int | float) else _VIEW_CONE
-            for cause, message in lacking(self._as_made(vdi, frame), cone, source.remedy):
+            for cause, message in lacking(self._as_made(vdi, frame), cone):
                 # Once for all VDIs of one view, such as the steps of a series
-                self.warnings.warn(message, cause=(cause, (vdi.camera, vdi.window_size)))
+                self.warn(message, cause=(cause, (vdi.camera, vdi.window_size)))
         parts = source.parts()
         blended = len(parts) > 1 and parts[0][0] is vdi
         full = not frame.window.previews(self.settings)
         return frame.showing(vdi, full=full, parts=tuple(parts) if blended else ())
-
-    def _going_on(self) -> dict[str, Any]:
-        """Return what is being made, and what was, as fields of :class:`Seen`."""
-        return {
-            "making": self.making,
-            "estimating": self._asked is not None and self.making is None,
-            "estimate": self.estimate,
-            "failed": self._stamp in self.failed,
-            "costs": self.costs,
-        }
 
     def _look(self, source: SourceInput, frame: Frame, *, joint: bool, one_view: bool) -> Seen:
         """Look at all that decides what the frame shows."""
@@ -230,7 +232,11 @@ class Planner:
             volume=volume,  # type: ignore[arg-type]
             late=late,
             seconds=1 / (window.pace.headroom * window.rate(settings)) if previews else None,
-            **self._going_on(),
+            making=self.making,
+            estimating=self._asked is not None and self.making is None,
+            estimate=self.estimate,
+            failed=stamp in self.failed,
+            costs=self.costs,
         )
         self.seen = seen if watched else None
         if watched:
@@ -266,7 +272,7 @@ class Planner:
                 for_view = not (seen.stale or seen.chosen)
                 self.making = Making(request.content, planned.make, for_view)
                 self._asked = request
-                self.worker.put(vdi_job(request.generation, request.target))
+                self.worker.put(vdi_job(request, request.target))
         if planned.estimate:
             self._estimate(source, seen.view)
         if planned.update:
@@ -340,12 +346,23 @@ class Planner:
 
     def _complain(self, error: BaseException) -> None:
         """Say once that a VDI cannot be made."""
-        said = None if self.input is None else self.input.complaint(error)
-        usual = (
-            f"the VDI cannot be made anew: {type(error).__name__}: {error}; what was shown stays, "
-            "and actor.regenerate() tries again"
-        )
-        self.warnings.warn(said or usual, error)
+        said = f"another VDI cannot be made: {type(error).__name__}: {error}; what was shown stays"
+        self.warn(f"{said}, and actor.regenerate() tries again", error)
+
+    def warn(
+        self, message: str, error: BaseException | None = None, cause: Hashable = None
+    ) -> None:
+        """Say a thing once: exceptions cannot pass through VTK's renderer. It is in the log, too.
+
+        What has the same ``cause`` was said before.
+        """
+        _log.debug("%s", message, exc_info=error)
+        if (cause or message) not in self.said:
+            self.said.add(cause or message)
+            try:
+                warn_external(message)
+            except VDIWarning:  # warnings are errors: the log is what is left
+                _log.error(message)
 
     # Between frames
 
@@ -408,7 +425,7 @@ class Planner:
                 if source.stamp() not in self.failed:
                     self._update(source)
         elif seen is not None:
-            return source.of_view(source.view_for(*seen))
+            return source.source.UpdateFromInput(source.view_for(*seen))
         return source.last()
 
     def vdi_to_pick(self, frame: Frame) -> VDI | None:

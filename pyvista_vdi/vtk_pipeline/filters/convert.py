@@ -25,11 +25,6 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.vtk_pipeline import vtk
 
-# The documented name of it is here
-from pyvista_vdi.vtk_pipeline.filters.properties import (
-    transfer_function_from_property as transfer_function_from_property,
-)
-
 #: Point scalars of the canonical form: how many supersegments each pixel's list has.
 COUNT = "count"
 #: Field array of the canonical form: everything that is not an array, as JSON.

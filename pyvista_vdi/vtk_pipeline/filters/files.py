@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.io import checked_target, read, read_info
 from pyvista_vdi.io.files import holds
+from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
-from pyvista_vdi.model.packing import check_precision
+from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.vdi import picture_size
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     Algorithm,
@@ -100,7 +102,7 @@ class VDIWriter(VDIFileAlgorithm):
     SetPrecision, GetPrecision = accessors(
         "precision",
         "what a supersegment takes: ``'exact'`` or ``'8-byte'``; ``None``: as of the VDI",
-        check=lambda precision: None if precision is None else check_precision(precision),
+        check=partial(one_of, name="precision", names=PRECISIONS, none=True),
     )
     SetCompression, GetCompression = accessors(
         "compression", "the compression, as of :meth:`VDI.save`; ``None``: the file's usual one"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
-from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.vtk_pipeline.filters.algorithm import wanted_time
@@ -43,8 +41,6 @@ class Input:
     prop: Any = None
     #: The port of what the bounds depend on; ``None`` where they depend on nothing.
     port: Any = None
-    #: What remedies a view that the VDI does not serve, where there is no source.
-    remedy = "without its volume it cannot be made anew"
     #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
     period: int | None = None
     #: Whether one step of a series is shown after the other: the event loop has to look at that.
@@ -116,10 +112,6 @@ class Input:
 
         ``None`` where nothing goes on by itself.
         """
-        return None
-
-    def complaint(self, error: BaseException) -> str | None:
-        """Return what is said of an error between two frames; ``None``: what is usual."""
         return None
 
     def parts(self) -> list[tuple[VDI, float]]:
@@ -247,29 +239,17 @@ class SourceInput(Input):
             given = given.replace(model_transform=model_transform)
         return View(given, self.source.GetWindowSize() or size)
 
-    def of_view(self, view: View) -> VDI:
-        """Return the VDI of a view and of what there is now, made if it is another one.
-
-        The view of those to come stays.
-        """
-        source, wanted = self.source, self.source.MakeRequest(view)
-        made = source.GetCurrentRequest()
-        if made is None or made.key != wanted.key:
-            source.TakeVDI(source.MakeVDI(wanted), wanted, view=False)
-        return source.GetCurrentVDI()  # type: ignore[return-value]
-
     def exact_request(self, view: View) -> Request:
         """Return what a VDI of exactly a view's picture is made of.
 
         What covers all of a volume that is near would have larger lists than that has pixels.
         """
         wanted = self.source.MakeRequest(view)
-        camera, size = view.camera, view.size
-        generating, lists = wanted.generating
-        extents = zip(generating.half_extent(lists), camera.half_extent(size), strict=True)
+        camera, size, lists = view.camera, view.size, wanted.window_size
+        extents = zip(wanted.camera.half_extent(lists), camera.half_extent(size), strict=True)
         pixels = math.prod(size) * math.prod(high / low for high, low in extents)
         if pixels > math.prod(lists) * (1 + ROUNDING):
-            wanted = replace(wanted, generating=(camera, size))
+            wanted = wanted.seen_from(camera, size)
         return wanted
 
     def take_camera(self, camera: Any, model_transform: NDArray[np.float64]) -> None:
@@ -321,7 +301,6 @@ class DeferredInput(Input):
         self.prop, self._values, self._bounds, self._camera = prop, values, bounds, camera
         self._view: View | None = None
         self._made_at: Any = None
-        self._look: TransferFunction | None = None  # of the VDI that was made last
 
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
@@ -348,9 +327,7 @@ class DeferredInput(Input):
         """Return the VDI that the property makes of the values now; ``None`` without a view."""
         values, stamp = self.deferred, self.stamp()
         if values is not None and (self._vdi is None or self._made_at != stamp):
-            look = transfer_function_from_property(self.prop)
-            if self._vdi is None or self._look != look:  # the time stamp alone says little
-                self._vdi, self._look = classify_on_device(values, look), look
+            self._vdi = classify_on_device(values, transfer_function_from_property(self.prop))
             self._made_at = stamp
         return self._vdi
 

@@ -36,7 +36,6 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     accessors,
     announce,
     ask_for_all,
-    checked_size,
     named_pair,
     wanted_time,
 )
@@ -52,39 +51,25 @@ from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData, vtkWeakRef
 
 
 @dataclass(frozen=True)
-class Request:
+class Request(GenerationRequest):
     """Everything that decides a VDI, read from the pipeline at one moment."""
 
-    volume: Volume
-    transfer_function: TransferFunction
-    screen: View
-    generating: tuple[Camera, tuple[int, int]]  # V_O and its window, after coverage
-    options: GenerationOptions
-    target: QualityTarget | None
-    device: Any
-    metadata: dict[str, Any]  # what is added to the VDI's
-    content: Any = field(repr=False)  # equal where what is generated from is, the view apart
+    screen: View = None  # type: ignore[assignment]  # what a frame shows it in, before coverage
+    target: QualityTarget | None = None
+    content: Any = field(default=None, repr=False)  # equal where only the view is another
     covered: bool = True  # as far as coverage asks
 
     @property
     def key(self) -> Any:
         """Equal where the VDIs would be equal."""
-        return (self.content, self.generating)
+        return self.content, self.camera, self.window_size
 
-    @property
-    def generation(self) -> GenerationRequest:
-        """What is asked of whatever generates."""
-        metadata, screen = self.metadata, self.screen
-        if self.generating != (screen.camera, screen.size):
-            metadata = {**metadata, "screen": screen_metadata(screen.camera, screen.size)}
-        return GenerationRequest(
-            self.volume,
-            self.transfer_function,
-            *self.generating,
-            self.options,
-            self.device,
-            metadata=metadata,
-        )
+    def seen_from(self, camera: Camera, window_size: tuple[int, int]) -> Request:
+        """Return the same from another V_O; the VDI's metadata say the screen's where that is."""
+        metadata = {name: entry for name, entry in self.metadata.items() if name != "screen"}
+        if (camera, window_size) != (self.screen.camera, self.screen.size):
+            metadata["screen"] = screen_metadata(self.screen.camera, self.screen.size)
+        return replace(self, camera=camera, window_size=window_size, metadata=metadata)
 
 
 class VDISource(SceneAlgorithm):
@@ -112,10 +97,15 @@ class VDISource(SceneAlgorithm):
 
     bad_input = InvalidVolumeError
 
-    SetWindowSize, GetWindowSize = accessors(
-        "window_size",
-        "the screen's width and height in pixels, as two numbers or one pair",
-        check=checked_size,
+    SetScalars, GetScalars = accessors(
+        "scalars",
+        "the array by its name, ``None`` for the active scalars, and which is preferred where "
+        "points and cells have one of that name: ``'point'``, as by default, or ``'cell'``",
+        (None, "point"),
+        lambda name, preference="point": (
+            name,
+            one_of(preference, "preference", ("point", "cell")),
+        ),
     )
     SetCoverage, GetCoverage = accessors(
         "coverage",
@@ -165,18 +155,6 @@ class VDISource(SceneAlgorithm):
         self.inputs: weakref.WeakSet[Any] = weakref.WeakSet()  # mappers' inputs that draw this
 
     # What is set
-
-    def SetScalars(self, name: str | None, preference: str = "point") -> None:
-        """Choose the array by name; ``None`` means the active scalars.
-
-        ``preference``: which is taken where points and cells have one of that name.
-        """
-        one_of(preference, name="preference", names=("point", "cell"))
-        self._change("scalars", name)
-        self._change("preference", preference, "point")
-
-    _, GetScalars = accessors("scalars", "the array's name, or ``None`` for the active scalars")
-    _, GetPreference = accessors("preference", "whether points or cells come first", "point")
 
     def SetLights(self, lights: LightsLike | None) -> None:
         """Set what a shaded volume is lit by.
@@ -230,13 +208,9 @@ class VDISource(SceneAlgorithm):
         """
         return self._make_request(self.UpdateInput(), view)
 
-    def TakeVDI(self, vdi: VDI, request: Request, *, view: bool = True) -> None:
-        """Take a VDI that was made of a request elsewhere, as if it had been made here.
-
-        ``view``: its view becomes that of the VDIs to come.
-        """
-        if view:
-            self._set |= {"window_size": request.screen.size, "camera": request.screen.camera}
+    def TakeVDI(self, vdi: VDI, request: Request) -> None:
+        """Take a VDI that was made of a request elsewhere; its view is that of those to come."""
+        self._set |= {"window_size": request.screen.size, "camera": request.screen.camera}
         self._vdi, self._request = vdi, request
         self.Modified()  # the output is another
 
@@ -249,7 +223,7 @@ class VDISource(SceneAlgorithm):
                 "VDI covers the current view only (coverage='view'); move the camera back and "
                 "regenerate for the whole volume"
             )
-        asked = request.generation.replace(progress=self._advance)
+        asked = request.replace(progress=self._advance)
         if request.target is None:
             return generate_vdi(asked)
         vdi = generate_to_target(asked, request.target)
@@ -266,7 +240,8 @@ class VDISource(SceneAlgorithm):
         The volume and its property are shared; what is set of one is not set of the other.
         """
         other = VDISource()
-        other.SetInputConnection(self.GetInputConnection(0, 0))
+        if self.GetNumberOfInputConnections(0) > 0:
+            other.SetInputConnection(self.GetInputConnection(0, 0))
         other.SetVolumeProperty(self.GetVolumeProperty())
         other.lit_by.Set(self.lit_by.Get())
         other._set, other.placed = dict(self._set), self.placed
@@ -290,19 +265,22 @@ class VDISource(SceneAlgorithm):
         self.GetInputAlgorithm(0, 0).Update()
         return self.GetInputDataObject(0, 0)
 
-    def UpdateFromInput(self) -> VDI:
-        """Return the VDI of the data that are at the input by now.
+    def UpdateFromInput(self, view: View | None = None) -> VDI:
+        """Return the VDI of the data that are at the input by now, or one of another view.
 
         They are those of before where an algorithm further up has failed, which :meth:`GetVDI`
-        raises.
+        raises. The view of the VDIs to come stays.
         """
-        return self._made(self.MakeRequest())
+        vdi = self._made(self.MakeRequest(view))
+        if view is not None:
+            self.Modified()  # the output is another
+        return vdi
 
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the output's extent: one point per list, as far as it is known before."""
         self.picture_size = self.GetWindowSize() or (1, 1)
         made = self._request
-        announce(outputs, self.picture_size if made is None else made.generating[1])
+        announce(outputs, self.picture_size if made is None else made.window_size)
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
@@ -341,28 +319,26 @@ class VDISource(SceneAlgorithm):
         options = replace(self.GetOptions(), lights=lights)
         # Where lights of the scene shine on it, the volume is lit where it stands now
         placed = self.placed if lights.of_scene else None
-        screen = View(camera, window_size)
-        generating = (camera, window_size)
+        generating, covered = (camera, window_size), True
         if placed is not None:
             generating = (camera.replace(model_transform=placed), window_size)
-        covered = True
         if self.GetCoverage() == "bounds":
             # The corners of the box of points, model frame: tighter than bounds if rotated
             box = bounds_corners([end for n in volume.dimensions for end in (0, n - 1)])
             corners = np.column_stack([box, np.ones(8)]) @ volume.index_to_model.T[:, :3]
             wide = covering_view(*generating, corners)
             covered, generating = wide is not None, wide or generating
-        metadata, device = self.GetMetadata(), self.GetDevice()
+        device, metadata = self.GetDevice(), {"scalars": volume.name, **self.GetMetadata()}
         content = (self._volume_key, table, options, placed, target, device, metadata)
-        metadata = {"scalars": volume.name, **metadata}
-        settings = (options, target, device, metadata, content, covered)
-        return Request(volume, table, screen, generating, *settings)
+        settings = (options, device, None, metadata, View(camera, window_size), target)
+        request = Request(volume, table, camera, window_size, *settings, content, covered)
+        return request.seen_from(*generating)
 
     def _read(self, image: Any) -> Volume:
         """Return the volume; the same object as long as it is the same (it is on the device)."""
         if image is None:
             raise InvalidVolumeError("what is before VDISource gives no data: check its input")
-        image, chosen = require_image(image), (self.GetScalars(), self.GetPreference())
+        image, chosen = require_image(image), self.GetScalars()
         array = scalars_of(image, *chosen)
         # The image's time is newer than its arrays', whose values may have been written in place
         key = (array.GetAddressAsString(""), image.GetMTime())

@@ -1,18 +1,13 @@
-"""What a person is told of a VDI on the screen: its status and warnings."""
+"""What a person is told of a VDI on the screen."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Literal
 
-from pyvista_vdi.errors import VDIWarning, warn_external
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.costs import RenderMode
 from pyvista_vdi.quality.targets import describe
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -98,22 +93,3 @@ class VDIStatus:
         if self.progress is not None:
             parts.append(f"making the next: {self.progress:.0%}")
         return ", ".join(parts)
-
-
-class Warnings:
-    """Says each thing once, as a VDIWarning: exceptions cannot pass through VTK's renderer."""
-
-    def __init__(self) -> None:
-        self.said: set[Hashable] = set()
-
-    def warn(
-        self, message: str, error: BaseException | None = None, *, cause: Hashable = None
-    ) -> None:
-        """Warn, unless this, or its cause, was said before; a traceback goes to the log."""
-        _log.debug("%s", message, exc_info=error)
-        if (cause or message) not in self.said:
-            self.said.add(cause or message)
-            try:
-                warn_external(message)
-            except VDIWarning:  # warnings are errors: the log is what is left
-                _log.error(message)

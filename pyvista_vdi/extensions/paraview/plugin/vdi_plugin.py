@@ -104,7 +104,7 @@ class VDISourceFilter(Looking, Functions, vtk_pipeline.VDISource):
             view = view.azimuth(turn).elevation(lift)
         self.SetCamera(view)
         # Bring the volume property up to date with what is given, and with defaults
-        ends = scalars_of(image, self.GetScalars(), self.GetPreference()).GetFiniteRange()
+        ends = scalars_of(image, *self.GetScalars()).GetFiniteRange()
         volume = self._read(image)
         self.take_looks(volume.name, ends, volume.default_unit_distance)
         self.SetVolumeProperty(self.looks)

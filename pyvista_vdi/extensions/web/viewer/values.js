@@ -129,8 +129,8 @@ export function fillTable(prepared, transfer, table) {
   }
 }
 
-// Straight colour and extinction of values that lie as classified of
-// opencl/lib/values.cl has them: a share from low to high, one from there to 1, and the others at the low end.
+// Straight colour and extinction of values that lie as classified of opencl/lib/values.cl has them:
+// a share from low to high, one from there to 1, and the others at the low end.
 function mediumInto(table, at, atLow, sums, mean, spread, stepsPerLength) {
   const rest = 1 - mean, square = spread * spread, reach = ROOT_OF_3 * spread;
   let low = mean - reach, high = mean + reach, share = 1, above = 0;
