@@ -284,7 +284,6 @@ class PreparedVDI:
                 self._prepare_lists(held, self.headers, keep)
             else:
                 self._prepare_packed(held, keep)
-            runtime.finish()  # the buffers above may be host memory in use
         if runtime.is_cpu:
             self.lit = share_lit(vdi, *self.depths)
 
@@ -365,14 +364,12 @@ class PreparedVDI:
             runtime.buffer((bundles + 1,), np.uint64, "where bundles begin") as begins,
             runtime.result((width * height, 2), name="ends of lists") as ends,
         ):
-            for buffer, value in ((longest, 0), (ends, np.nan)):
+            for buffer, value in ((longest, 0), (begins, 0), (ends, np.nan)):
                 runtime.fill(buffer, value)
-            runtime.fill(begins, 0, 1)
             occupancy, offsets = "raycasting/occupancy.cl", "generation/offsets.cl"
             items, group = padded(bundles, GROUP), GROUP
-            of_lists = {name: held[name] for name in _COUNTED}
-            of_lists |= {"width": width, "height": height, "lengths": lengths}
-            measure = runtime.bind(occupancy, "measure_bundles", **of_lists)
+            of_lists = {name: held[name] for name in _COUNTED} | {"width": width, "height": height}
+            measure = runtime.bind(occupancy, "measure_bundles", **of_lists, lengths=lengths)
             measure(items, group, longest=longest, ends=ends)
             add = {"lists": bundles, "lengths": lengths, "partial": GROUP, "sums": sums}
             runtime.bind(offsets, "sum_lengths", **add)(blocks * GROUP, group)
