@@ -32,7 +32,7 @@ from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.measure.bench import accuracy, take_turns
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
+from pyvista_vdi.model.options import TRANSMITTANCE_CUTOFF
 from pyvista_vdi.model.vdi import VDI
 
 Runs = Sequence[Segment]

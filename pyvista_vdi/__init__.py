@@ -59,7 +59,6 @@ registry.core = registry.Extension(
     methods={
         "Camera.to_pyvista": "pyvista_vdi.plotting.imports:camera_to_pyvista",
         "DeferredVDI.classified": "pyvista_vdi.api.vdis:classified",
-        "VDICollection.classified": "pyvista_vdi.api.vdis:classified_each",
         "TransferFunction.from_arguments": (
             "pyvista_vdi.plotting.classify:transfer_function_from_arguments"
         ),

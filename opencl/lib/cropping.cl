@@ -3,9 +3,7 @@
 // Two planes across each axis of the model frame make 27 regions; bit i + 3 j + 9 k of `regions`
 // keeps the i-th along x, the j-th along y and the k-th along z, as in vtkVolumeMapper. The planes
 // are forms (lib/rays.cl) that are positive beyond them: low x, high x, low y, high y, low z, high
-// z; a high one is never below its low one.
-//
-// -D CROPPED   not 0: the regions that are kept are no box (a box is clipped to)
+// z; a high one is never below its low one. Rays are clipped to a box: then there are no regions.
 #include "lib/lanes.cl"
 #pragma OPENCL FP_CONTRACT OFF
 

@@ -1,7 +1,6 @@
 // What rays cross of one of several VDIs, as segments in a pool (multi_vdi/pool.cl), a ray of a
 // band or a block of 4 x 4 in a work-item (lib/lanes.cl); multi_vdi/merge.cl composites them
 // together.
-#define ONE_LIST 0
 #include "raycasting/ray.cl"
 #include "multi_vdi/pool.cl"
 #pragma OPENCL FP_CONTRACT OFF

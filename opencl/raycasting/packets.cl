@@ -7,9 +7,8 @@
 // together, while rays that are ahead wait. So each list and each supersegment is loaded once for
 // the packet. What a ray does is the same as in raycasting/walk.cl, whatever the others do.
 //
-// -D SWEEP_V=0, 1      p is v, not u
-// -D UPRIGHT=0, 1      packets stand on end in the window of V_N
-// -D SKIP_EMPTY=0, 1   pass by what the occupancy grid says is empty; the picture is the same
+// What the occupancy grid says is empty is passed by where there are masks; the picture is the
+// same.
 #define LANES 16
 #define CROPPED 0
 #include "lib/transpose.cl"
@@ -52,8 +51,8 @@ inline Int across_strip(int first, int number, int along_size, int across_size, 
 }
 
 // Of u's and v's, that of p and that of q; and of p's and q's, those of u and v
-#define FIRST_OF(of_u, of_v) (SWEEP_V ? (of_v) : (of_u))
-#define SECOND_OF(of_u, of_v) (SWEEP_V ? (of_u) : (of_v))
+#define FIRST_OF(of_u, of_v) (sweep_v ? (of_v) : (of_u))
+#define SECOND_OF(of_u, of_v) (sweep_v ? (of_u) : (of_v))
 
 // How far the rays have come.
 typedef struct {
@@ -66,7 +65,7 @@ typedef struct {
 // another stack has a `new_stack` there.
 inline void skip_empty_cells(Progress *now, Int *new_stack, Int looks, int P, const ListRay *rays,
                              const Axis *p, const Axis *q, const Sense *sense, const Grid *grid,
-                             float depth_origin)
+                             float depth_origin, bool sweep_v)
 {
     const int stack_p = P >> STACK_SHIFT;
     while (ANY(looks)) {
@@ -140,7 +139,7 @@ inline float far_face(const Lists *lists, List list, int n, bool away, float dep
 __attribute__((always_inline)) inline void sweep(Seen *seen, const ListRay *rays, const Axis *p,
                                                  const Axis *q, Int going, Int first_p, Int first_q,
                                                  bool away, const Lists *lists, const Grid *grid,
-                                                 float depth_origin, float cutoff)
+                                                 float depth_origin, float cutoff, bool sweep_v)
 {
     const Sense sense = sense_of(rays->along.z, rays->deep.z, away);
     const Real r_end = rays->r_begin + 1.0f;
@@ -159,9 +158,10 @@ __attribute__((always_inline)) inline void sweep(Seen *seen, const ListRay *rays
         const int P = place_p * p->step;
         Int column = now.p == place_p;
         const Int looks = column && new_stack;
-        if (SKIP_EMPTY && ANY(looks)) {
+        if (grid->masks && ANY(looks)) {
             new_stack = new_stack && !looks;
-            skip_empty_cells(&now, &new_stack, looks, P, rays, p, q, &sense, grid, depth_origin);
+            skip_empty_cells(&now, &new_stack, looks, P, rays, p, q, &sense, grid, depth_origin,
+                             sweep_v);
             column = now.p == place_p;
         }
         const Real r_p = CROSSINGS(p, (Real)(P));
@@ -234,11 +234,13 @@ __attribute__((always_inline)) inline void sweep(Seen *seen, const ListRay *rays
 KERNEL_OF_LANES void raycast_packets(
     VDI_PARAMETERS,
     float4 epipole, // see across_strip
+    int sweep_v,    // whether p is v, not u
+    int upright,    // whether packets stand on end in the window of V_N
     int4 part,      // of the window: first strip, how many, number of each strip's first packet
     __global float4 *image)
 {
-    const int along_size = UPRIGHT ? frame.height : frame.width,
-              across_size = UPRIGHT ? frame.width : frame.height;
+    const int along_size = upright ? frame.height : frame.width,
+              across_size = upright ? frame.width : frame.height;
     // Strips lie side by side in blocks of LANES packets, so that what is close in the window is
     // close in time
     const int item = (int)get_global_id(0);
@@ -253,7 +255,7 @@ KERNEL_OF_LANES void raycast_packets(
     const Int in_window = is_own && along < along_size && across >= 0 && across < across_size;
     if (!ANY(in_window))
         return;
-    const Int x = UPRIGHT ? across : along, y = UPRIGHT ? along : across;
+    const Int x = upright ? across : along, y = upright ? along : across;
     const Int pixels = places_in_picture(x, y, in_window, frame.width, frame.height);
     ListRay rays;
     begin_ray(&rays, forms, &frame, offsets_from_middle(x, frame.width),
@@ -278,10 +280,10 @@ KERNEL_OF_LANES void raycast_packets(
         take_step(&q, (way & 4) != 0);
         if (way & 1)
             sweep(&seen, &rays, &p, &q, going, first_p, first_q, true, &lists, &grid,
-                  frame.depth_origin, frame.cutoff);
+                  frame.depth_origin, frame.cutoff, sweep_v);
         else
             sweep(&seen, &rays, &p, &q, going, first_p, first_q, false, &lists, &grid,
-                  frame.depth_origin, frame.cutoff);
+                  frame.depth_origin, frame.cutoff, sweep_v);
     }
     store_fours(image, pixels, composited(&seen));
 }

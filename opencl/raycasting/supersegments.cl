@@ -45,6 +45,7 @@ typedef struct {
     float slabs_per_depth;            // per world unit
     float depth_step, nearest_offset; // of 8-byte lists: of depth; least in front of the eye
     uint regions;                     // of cropping that are kept, see lib/cropping.cl
+    int one_list;                     // whether a ray stays in a list
 } Frame;
 
 #define BLOCK 4 // rays along each edge of a block, in which pixels are dealt to work-items
@@ -52,7 +53,8 @@ typedef struct {
     __global const HEADER_T *headers, __global const ulong *faces, __global const ulong *media,    \
         __global const float *forms,        /* see begin_ray */                                    \
         __global const float *opaque_depth, /* t at which each pixel's ray ends; 0: none does */   \
-        __global const ulong *masks,        /* of the occupancy grid's stacks: occupied slabs */   \
+        __global const ulong                                                                       \
+            *masks, /* of the occupancy grid's stacks: occupied slabs; 0: not skipped */           \
         Frame frame
 #define LISTS_OF(frame)                                                                            \
     {headers,                                                                                      \

@@ -9,10 +9,9 @@
 // Who includes this says before what is Made of what rays cross; take_medium, which adds it; and
 // are_done, which rays no light is left of.
 //
-// -D SKIP_EMPTY=0, 1   pass by what the occupancy grid says is empty; the picture is the same
-// -D ONE_LIST=0, 1     the view is V_O, and LANES is 1: a ray stays in a list, whose supersegments
-// a
-//                      loop of its own meets
+// What the occupancy grid says is empty is passed by where there are masks; the picture is the
+// same. At V_O, and where LANES is 1, a ray stays in a list, whose supersegments a loop of its own
+// meets.
 #include "lib/lanes.cl"
 typedef Int Steps;
 typedef Real Border;
@@ -40,15 +39,15 @@ inline void begin_path(Path *path, __global const float *forms, const Frame *fra
 inline Real lists_crossed(const Path *path) { return fabs(path->u.along) + fabs(path->v.along); }
 
 // Bring the lists close that rays begin and end in, if they cross few: those in between are others'
-// ends. Of blocks, and with ONE_LIST, those of the next column of blocks, which come while this
-// one's are walked through.
-inline void prefetch_ends(const Path *path, const Lists *lists, int height)
+// ends. Of blocks, and of rays in one list, those of the next column of blocks, which come while
+// this one's are walked through.
+inline void prefetch_ends(const Path *path, const Lists *lists, const Frame *frame)
 {
     const Int few = path->ray.present && lists_crossed(path) < LISTS_TO_PREFETCH;
     if (!ANY(few))
         return;
     const Axis *u = &path->u, *v = &path->v;
-    const int shift = LANES > 1 || ONE_LIST ? BLOCK * lists->high / height : 0;
+    const int shift = LANES > 1 || frame->one_list ? BLOCK * lists->high / frame->height : 0;
     const Real r_end = path->ray.r_begin + 1.0f;
     const Places first_i = {list_index(u, path->ray.start.x, shift)};
     const Places first_j = {list_index(v, path->ray.start.y, 0)};
@@ -154,7 +153,7 @@ inline Crossing next_crossing(Cursor *at, const Path *path, const Sense *sense, 
     return crossing;
 }
 
-// With ONE_LIST: come to the next supersegment of the list, if the ray meets it there.
+// Of rays in one list: come to the next supersegment of the list, if the ray meets it there.
 inline Int next_in_list(Cursor *at, Crossing *crossing, const Path *path, const Sense *sense,
                         const Lists *lists)
 {
@@ -199,7 +198,7 @@ __attribute__((always_inline)) inline void follow_in_sense(Made *made, const Pat
     Cursor at = begin_walk(path, &sense, active);
     for (int turn = 0; ANY(at.active); ++turn) {
         // Skip cells of the occupancy grid that no supersegment reaches (section 4)
-        if (SKIP_EMPTY && turn % TURNS_PER_LOOK == 0 && ANY(at.new_stack && at.active)) {
+        if (grid->masks && turn % TURNS_PER_LOOK == 0 && ANY(at.new_stack && at.active)) {
             skip_empty_cells(&at, at.new_stack && at.active, path, &sense, grid);
             at.new_stack = 0;
             if (!ANY(at.active))
@@ -216,7 +215,7 @@ __attribute__((always_inline)) inline void follow_in_sense(Made *made, const Pat
             clip_to_faces(&from, &to, &sense, crossing.face.near, crossing.face.far, at.r,
                           crossing.r_next, at.depth, crossing.next_depth);
             take_medium(made, &path->ray, from, to, medium, meets);
-            if (!ONE_LIST)
+            if (LANES > 1 || !frame->one_list)
                 break;
             crossing.stays = crossing.stays && !are_done(made, frame);
             meets = next_in_list(&at, &crossing, path, &sense, lists);
@@ -232,7 +231,7 @@ inline void follow(Made *made, const Path *path, const Lists *lists, const Grid 
 {
     if (!ANY(path->ray.present))
         return;
-    prefetch_ends(path, lists, frame->height);
+    prefetch_ends(path, lists, frame);
 #if LANES == 1
     follow_in_sense(made, path, path->ray.present, path->ray.away, lists, grid, frame);
 #else

@@ -1,8 +1,7 @@
 // Direct volume rendering: the baseline that a VDI is measured against, by the same march as
 // generation. A ray or a block of 4 x 4 in a work-item (lib/lanes.cl).
 //
-// -D CROPPED: see lib/cropping.cl; COMPENSATED: see lib/compositing.cl; the volume's: see
-// volume/march.cl
+// -D COMPENSATED: see lib/compositing.cl; the volume's: see volume/march.cl
 #include "volume/march.cl"
 #include "lib/cropping.cl"
 #include "lib/compositing.cl"
@@ -35,10 +34,10 @@ inline Real kept_share(const Kept *kept, Real front, Real back)
 KERNEL_OF_LANES void render_volume(
     MEDIUM_PARAMETERS, const RaysOfView view, __global const float *forms,
     __global const float
-        *opaque_depth,              // t at which each pixel's ray ends, top row first; 0: none does
-    float transmittance_cutoff,     // a ray ends where no more than this is left; negative: never
-    float opacity_multiplier,       // of optical depths
-    uint regions,                   // that cropping keeps; its planes are forms behind the others
+        *opaque_depth,          // t at which each pixel's ray ends, top row first; 0: none does
+    float transmittance_cutoff, // a ray ends where no more than this is left; negative: never
+    float opacity_multiplier,   // of optical depths
+    uint regions, // that cropping keeps, its planes are forms behind the others; 0: nothing is
     __global const float4 *samples, // see volume/rays_of_view.cl; 0: steps are sampled here
     __global float4 *states, // of each ray behind a part of its steps: what has been seen; 0: all
                              // steps are taken
@@ -62,7 +61,7 @@ KERNEL_OF_LANES void render_volume(
         const Medium medium = MEDIUM_OF_PARAMETERS;
         const size_t sampled = samples_start(first, view.steps);
         Kept kept;
-        if (CROPPED)
+        if (regions)
             kept =
                 kept_march(&march, forms + (6 + view.planes) * FORM_SIZE, rays.a, rays.b, regions);
         const Int end = min(view.first_step + view.steps, march.steps);
@@ -83,7 +82,7 @@ KERNEL_OF_LANES void render_volume(
                     LANES == 1 && samples
                         ? load_fours(samples + sampled, (k - view.first_step) * SAMPLE_LANES)
                         : step_medium(&march, &medium, front, back);
-                if (CROPPED)
+                if (regions)
                     step.w *= kept_share(&kept, front, back);
                 step.w *= opacity_multiplier;
                 look = !ANY(here & (step.w > 0.0f));

@@ -17,8 +17,7 @@ from pyvista_vdi.model.classification import IN_PLACE, Classification
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, as_volume
-from pyvista_vdi.model.options import MediumOptions
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions, SceneOptions
+from pyvista_vdi.model.options import FrameRequest, MediumOptions, RenderOptions, SceneOptions
 from pyvista_vdi.model.types import CameraLike, DeviceLike, ShownLike, VolumeLike, WindowSize
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
@@ -177,7 +176,7 @@ def render_depth(
     seen = _seen(shown, view)
     usual = getattr(shown, "picture_size", seen.picture_size)
     size: Any = usual if window_size is None else window_size
-    request = FrameRequest(view, size, options.drawn(), opaque_depth, device)
+    request = FrameRequest(view, size, RenderOptions(**vars(options)), opaque_depth, device)
     from pyvista_vdi.raycasting.raycast import render_first_hits
 
     return render_first_hits(seen, request, FirstHit.of(opacity_threshold, accumulated))
@@ -248,7 +247,7 @@ def pick(
     size: Any = usual if window_size is None else window_size
     from pyvista_vdi.raycasting.picking import pick_vdi
 
-    request = FrameRequest(view, size, options.drawn(), opaque_depth)
+    request = FrameRequest(view, size, RenderOptions(**vars(options)), opaque_depth)
     return pick_vdi(seen, request, pixel, FirstHit.of(opacity_threshold, accumulated), kept)
 
 
@@ -301,7 +300,7 @@ def render_volume(
         If there is no device, or it fails.
     """
     view, read = Camera.from_any(camera), as_volume(volume, look.scalars, look.preference)
-    drawn = options.drawn()
+    drawn = RenderOptions(**vars(options))
     if not as_flag(early_termination, "early_termination"):
         drawn = drawn.replace(transmittance_cutoff=0.0)
     table = look.transfer_function_of(read)

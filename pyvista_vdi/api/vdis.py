@@ -23,7 +23,6 @@ from pyvista_vdi.model.options import (
     QualityTarget,
     declared,
 )
-from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import (
     CameraLike,
     ClientLike,
@@ -184,38 +183,23 @@ def read(path: str | os.PathLike[str], **options: Any) -> VDI | DeferredVDI | VD
     return read_file(path, **options)
 
 
-#: What says which scalars were seen, and how: that was said where they were kept.
-_SAID_BEFORE = ("scalars", "preference", "interpolation")
-
-
-def classified(deferred: DeferredVDI, look: Mapping[str, Any]) -> VDI:
-    """Return what :meth:`DeferredVDI.classified` does."""
-    return classify_on_device(deferred, _table_of(look, deferred.value_range), look.get("device"))
-
-
-def classified_each(collection: VDICollection, look: Mapping[str, Any]) -> VDICollection:
-    """Return what :meth:`VDICollection.classified` does."""
-    ends = collection.value_range
+def classified(stored: DeferredVDI | VDICollection, look: Mapping[str, Any]) -> Any:
+    """Return what the method ``classified`` of a VDI that keeps values, or of several, does."""
+    ends, device = stored.value_range, look.get("device")
     if ends is None:
         raise InvalidVDIError(
             "these VDIs have colours already: a look is for those that keep values, which "
             "classification='deferred' makes"
         )
-    table, device = _table_of(look, ends), look.get("device")
-    made: Any = partial(classify_on_device, transfer_function=table, device=device)  # is pickled
-    return collection._mapped(made)
-
-
-def _table_of(look: Mapping[str, Any], ends: tuple[float, float]) -> TransferFunction:
-    """Return the transfer function of a look, for values of a range."""
     refuse_unknown(look, "classified", (*declared(Classification), "device"))
     asked = Classification(**{name: value for name, value in look.items() if name != "device"})
-    for name in _SAID_BEFORE:
-        if name in asked.given:
-            raise InvalidArgumentError(
-                f"{name} was said where the values were kept: give it to pyvista_vdi.generate, "
-                "and leave it out here"
-            )
+    if said := asked.given.keys() & {"scalars", "preference", "interpolation"}:
+        raise InvalidArgumentError(
+            f"{', '.join(sorted(said))} was said where the values were kept: give it to "
+            "pyvista_vdi.generate, and leave it out here"
+        )
     # The range of the values stands for those of the volume
     values: Any = SimpleNamespace(array=np.array(ends), rgba=False, finite_range=lambda: ends)
-    return asked.transfer_function_of(values)
+    table = asked.transfer_function_of(values)
+    made = partial(classify_on_device, transfer_function=table, device=device)  # is pickled
+    return stored._mapped(made) if isinstance(stored, VDICollection) else made(stored)

@@ -15,8 +15,14 @@ from typing import Any
 
 from pyvista_vdi.model.camera import check_window_size
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget, declared
-from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
+from pyvista_vdi.model.options import (
+    Deferral,
+    DrawingOptions,
+    GenerationOptions,
+    QualityTarget,
+    RenderOptions,
+    declared,
+)
 from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
 

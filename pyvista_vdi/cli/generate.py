@@ -17,14 +17,14 @@ from pyvista_vdi.cli.inputs import (
     given,
     read_volume,
 )
-from pyvista_vdi.cli.text import mebibytes, printable
+from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
-from pyvista_vdi.model.standard_cases import ELEVATION, VIEW_ANGLE, filling_camera
+from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.progress import DelayedBar
 from pyvista_vdi.quality.targets import describe
@@ -59,7 +59,7 @@ def generate(options: argparse.Namespace) -> int:
 
 def say_vdi(options: argparse.Namespace, vdi: object, more: str = "") -> None:
     """Print what was written to ``--output``."""
-    n_bytes = mebibytes(Path(options.output).stat().st_size)
+    n_bytes = f"{Path(options.output).stat().st_size / 2**20:.1f} MiB"
     print(f"{printable(options.output)}: {vdi}, {n_bytes}{more}")
 
 
@@ -81,10 +81,7 @@ def generating_view(options: argparse.Namespace, volume: Volume) -> Camera:
             f"--elevation lifts a view that is {ELEVATION:g} degrees above the volume's middle, "
             f"and must leave it below 90; got {options.elevation:g}"
         )
-    return filling_camera(
-        volume.bounds,
-        options.size,
-        azimuth=options.azimuth,
-        elevation=ELEVATION + options.elevation,
-        view_angle=VIEW_ANGLE if options.view_angle is None else options.view_angle,
-    )
+    turned = {"azimuth": options.azimuth, "elevation": ELEVATION + options.elevation}
+    if options.view_angle is not None:
+        turned["view_angle"] = options.view_angle
+    return filling_camera(volume.bounds, options.size, **turned)

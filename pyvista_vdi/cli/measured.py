@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import asdict
 from typing import Any
-
-import numpy as np
 
 from pyvista_vdi.cli.inputs import (
     classification,
@@ -25,12 +22,7 @@ from pyvista_vdi.measure.bench import as_json
 from pyvista_vdi.measure.compare import contact_sheet, measure, table
 from pyvista_vdi.measure.tradeoff import AXES, COSTS, DEFAULT_AXES, measure_tradeoff, sweep
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.plotting.progress import DelayedBar
-
-#: Frames and views of ``tradeoff``, without and with ``--quick``.
-_SIZES = ((640, 360), (320, 180))
-_ANGLES = ((5.0, 30.0, 60.0), (5.0, 30.0))
 
 
 def compare(options: argparse.Namespace) -> int:
@@ -60,25 +52,10 @@ def tradeoff(options: argparse.Namespace) -> int:
     """Measure what each setting costs and gives, and write JSON and tables."""
     look = classification(options)
     Classification.composited(look, "tradeoff")  # refused before the volume is read
-    # With --quick the last of an axis's usual values
-    quick = bool(options.quick)
-    usual = {n: values[-1:] if quick else values for n, values in AXES.items()}
-    axes = dict(_axis(text, usual) for text in options.sweep or DEFAULT_AXES)
-    settings = sweep(axes)
+    settings = sweep(dict(map(_axis, options.sweep or DEFAULT_AXES)))
     name, volume = volume_name(options), read_volume(options)
-    if not set(look) - {"interpolation"} and not volume.rgba:
-        # A ramp from transparent black to opaque white, which needs no PyVista
-        ramp = np.linspace(0.0, 1.0, 256)
-        function = TransferFunction(np.stack([ramp] * 3, axis=1), ramp, volume.finite_range())
-        interpolation = look.get("interpolation", "nearest")
-        look = {"transfer_function": function.replace(interpolation=interpolation)}
-    how = {n: getattr(options, n) for n in ("repeats", "generations", "device")}
-    how |= {
-        "window_size": options.size or _SIZES[quick],
-        "angles": options.angles or _ANGLES[quick],
-        "vtk": not options.no_vtk,
-        "name": name,
-    }
+    how = {n: getattr(options, n) for n in ("angles", "repeats", "generations", "device")}
+    how |= {"window_size": options.size, "vtk": not options.no_vtk, "name": name}
     bar = DelayedBar(label="tradeoff")
     with output_files(options, f"tradeoff-{name}", "json", "md", "png") as files, closing(bar):
         found = measure_tradeoff(volume, settings, progress=bar, **how, **look)
@@ -93,15 +70,15 @@ def tradeoff(options: argparse.Namespace) -> int:
     return 0
 
 
-def _axis(text: str, usual: Mapping[str, tuple[Any, ...]]) -> tuple[str, tuple[Any, ...]]:
+def _axis(text: str) -> tuple[str, tuple[Any, ...]]:
     """Return an axis and its values as ``--sweep`` has them: ``lists`` or ``lists=0.5,2``."""
     given, equals, values = text.partition("=")
     name = given.replace("-", "_")
-    if name not in usual:
-        known = ", ".join(axis.replace("_", "-") for axis in usual)
+    if name not in AXES:
+        known = ", ".join(axis.replace("_", "-") for axis in AXES)
         raise InvalidArgumentError(f"--sweep knows no {given!r}: known are {known}")
     if not equals:
-        return name, usual[name]
+        return name, AXES[name]
     kind = type(AXES[name][0])
     read: Any = {"on": True, "off": False}.__getitem__ if kind is bool else kind
     try:

@@ -24,7 +24,7 @@ from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import UnsupportedError, VDIWarning
 from pyvista_vdi.io import check_writable, to_bytes, write_png
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
+from pyvista_vdi.model.options import DrawingOptions, RenderOptions
 from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
 from pyvista_vdi.model.vdi import picture_view
 from pyvista_vdi.model.whole_file import as_path, with_suffix

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -34,18 +34,14 @@ def steps_of_volumes(
     files: Sequence[str], options: argparse.Namespace, *, in_chunks: bool = False
 ) -> list[Step]:
     """Return the steps of files that hold volumes; see :func:`read_volume` for the options."""
-    return [step for file in files for step in _steps_of(file, options, in_chunks=in_chunks)]
-
-
-def _steps_of(file: str, options: argparse.Namespace, *, in_chunks: bool) -> Iterator[Step]:
-    given = {**vars(options), "file": file, "example": None}
-    times: Sequence[float] = ()
-    if is_store(file) and options.time_index is None:
-        times = open_store(argparse.Namespace(**given)).store.times
-    if len(times) < 2:
-        whole = argparse.Namespace(**given)
-        yield Step(file, None, partial(read_volume, whole, in_chunks=in_chunks))
-        return
-    for i, time in enumerate(times):
-        step = argparse.Namespace(**{**given, "time_index": i})
-        yield Step(f"{file}, step {i}", time, partial(read_volume, step, in_chunks=in_chunks))
+    steps = []
+    for file in files:
+        given: dict[str, Any] = {**vars(options), "file": file, "example": None}
+        times: Sequence[float] = ()
+        if is_store(file) and options.time_index is None:
+            times = open_store(argparse.Namespace(**given)).store.times
+        for i, time in enumerate(times if len(times) > 1 else (None,)):
+            one = {} if time is None else {"time_index": i}
+            read = partial(read_volume, argparse.Namespace(**given | one), in_chunks=in_chunks)
+            steps.append(Step(file if time is None else f"{file}, step {i}", time, read))
+    return steps

@@ -18,11 +18,6 @@ def printable(text: object) -> str:
     )
 
 
-def mebibytes(n: int) -> str:
-    """Return bytes in MiB."""
-    return f"{n / 2**20:.1f} MiB"
-
-
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write a text as UTF-8; the file appears whole or not at all."""
     with whole_file(path) as stream:

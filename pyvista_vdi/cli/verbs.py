@@ -52,10 +52,7 @@ look:
 """
 
 TRADEOFF = """
-VOLUME out no_vtk device
-quick          -         fewer settings and angles in a smaller window
-size           WxH       of all frames (default: 640x360; quick: 320x180)
-angles         A,B,...   from the generating view (default: 5,30,60; quick: 5,30)
+VOLUME out size=640x360 angles=5,30,60 no_vtk device
 repeats=5      COUNT     timed frames
 generations=3  COUNT     timed generations of each VDI
 sweep  AXIS[=A,B,...] ...  settings, with other values than usual: max-supersegments, \

@@ -18,11 +18,15 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_whole
+from pyvista_vdi.model.checks import Number
 from pyvista_vdi.model.host_memory import require_host_memory
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.model.options import (
+    FrameRequest,
+    GenerationOptions,
+    GenerationRequest,
+    RenderOptions,
+)
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -86,10 +90,7 @@ def accuracy(image: Image, reference: Image) -> dict[str, float]:
 def check_plan(angles: Sequence[float], least: int = 1, **counts: int) -> None:
     """Refuse angles that are none, and numbers of repetitions that make no sense."""
     for name, count in counts.items():
-        if not (isinstance(count, int) and least <= as_whole(count) <= 1000):
-            raise InvalidArgumentError(
-                f"{name} must be a whole number from {least} to 1000; got {count!r}"
-            )
+        Number(f"a whole number from {least} to 1000", least, 1000, whole=True, name=name)(count)
     if not angles or not all(math.isfinite(a) for a in angles):
         raise InvalidArgumentError(f"angles must be one or more numbers of degrees; got {angles!r}")
 
@@ -155,7 +156,7 @@ class Bench:
         self, vdi: VDI, camera: Camera, window_size: tuple[int, int] | None = None, **options: Any
     ) -> Image:
         """Draw a VDI; premultiplied RGBA (H, W, 4) on the host."""
-        frame = (camera, window_size or self.size, RenderOptions(**options))
+        frame = camera, window_size or self.size, RenderOptions(**options)
         return render_vdi(vdi, FrameRequest(*frame, device=self.runtime))
 
     def raycast(
@@ -166,8 +167,8 @@ class Bench:
         if key not in self._media:
             own = self.runtime, self.volume, self.table
             self._media[key] = DeviceVolume(*own, sample_distance=key[0], skip_empty=skip_empty)
-        frame = FrameRequest(camera, self.size, RenderOptions(**options))
-        return raycast_medium(self._media[key], frame)
+        shown = RenderOptions(**options)
+        return raycast_medium(self._media[key], FrameRequest(camera, self.size, shown))
 
     def reference(self, camera: Camera) -> Image:
         """Return the same picture, kept for other VDIs; a black one raises InvalidArgumentError."""
@@ -175,8 +176,7 @@ class Bench:
             self._references[camera] = self.raycast(camera)
         if not self._references[camera].any():
             raise InvalidArgumentError(
-                "nothing is to be seen: the transfer function leaves the whole volume transparent; "
-                "choose another opacity or clim"
+                "nothing is to be seen: all of it is transparent; choose another opacity or clim"
             )
         return self._references[camera]
 

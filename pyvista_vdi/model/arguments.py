@@ -15,15 +15,16 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
 from pyvista_vdi.model.options import (
     RECORDS,
     Deferral,
+    DrawingOptions,
     GenerationOptions,
     Option,
     Options,
     QualityTarget,
+    RenderOptions,
     declared,
     entries,
     record,
 )
-from pyvista_vdi.model.render_options import DrawingOptions, RenderOptions
 
 
 def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) -> None:

@@ -16,6 +16,8 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError, Unsuppo
 from pyvista_vdi.model.checks import as_flag, as_float, as_floats, as_vector
 
 Matrix: TypeAlias = NDArray[np.float64]
+#: What is given as a vector, and kept as a tuple.
+Vector: TypeAlias = Sequence[float] | NDArray[Any]
 
 #: Largest width or height of a window, in pixels: four times 16k, far beyond any display.
 MAX_WINDOW_EDGE = 65536
@@ -78,14 +80,14 @@ class Camera:
         parallel to the direction of projection, or ``model_transform`` cannot be inverted.
     """
 
-    position: Any
-    focal_point: Any
-    view_up: Any
+    position: Vector
+    focal_point: Vector
+    view_up: Vector
     _: KW_ONLY
     view_angle: float = 30.0
     parallel_projection: bool = False
     parallel_scale: float = 1.0
-    window_center: Any = (0.0, 0.0)
+    window_center: Vector = (0.0, 0.0)
     use_horizontal_view_angle: bool = False
     model_transform: Any = field(default=None, compare=False, repr=False)
     _transform: bytes = field(init=False, repr=False)

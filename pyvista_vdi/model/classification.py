@@ -63,8 +63,16 @@ class Described(Options):
     """Options of which metadata tell those that are given."""
 
     def describe(self) -> dict[str, Any]:
-        """Return what differs from the defaults, in values that JSON can hold."""
-        return {name: _plain(value) for name, value in self.given.items()}
+        """Return what differs from the defaults; what JSON cannot hold as a short description."""
+        found = {}
+        for name, given in self.given.items():
+            value = given.to_dict() if isinstance(given, TransferFunction) else given
+            value = value.tolist() if hasattr(value, "tolist") else value
+            try:
+                found[name] = json.loads(json.dumps(value, allow_nan=False))
+            except (TypeError, ValueError):
+                found[name] = getattr(value, "name", None) or type(value).__name__
+        return found
 
 
 @record
@@ -217,15 +225,3 @@ class Classification(Look, ArrayChoice):
         scalars = volume.array if volume.rgba else np.array(volume.finite_range())
         built: TransferFunction = from_arguments(scalars, rgba=volume.rgba, **arguments)
         return built
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as JSON can hold it; what it cannot hold as its short description."""
-    if isinstance(value, TransferFunction):
-        return value.to_dict()
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    try:
-        return json.loads(json.dumps(value, allow_nan=False))
-    except (TypeError, ValueError):
-        return getattr(value, "name", None) or type(value).__name__

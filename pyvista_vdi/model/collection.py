@@ -69,7 +69,7 @@ class VDICollection(Sequence[VDI]):
         --------
         DeferredVDI.classified : has the other errors, and the warning.
         """
-        return registry.method("VDICollection.classified")(self, look)  # type: ignore[no-any-return]
+        return registry.method("DeferredVDI.classified")(self, look)  # type: ignore[no-any-return]
 
     def _mapped(self: _Collection, function: Callable[[VDI], VDI]) -> _Collection:
         """Return it with what a function makes of each VDI, when that is asked for."""

@@ -27,12 +27,18 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
     values per point; ``preference`` says which array is meant where points and cells have one of
     that name. InvalidVolumeError if it is none of these, or has no such scalars.
     """
-    if isinstance(volume, Volume):
-        return _with_scalars(volume, scalars)
     if isinstance(volume, str | os.PathLike):
         array = scalars if isinstance(scalars, str) else None
-        read: Volume = registry.method("Volume.read")(volume, array=array)
-        return read if array is not None else _with_scalars(read, scalars)
+        volume = registry.method("Volume.read")(volume, array=array)
+        scalars = None if array is not None else scalars
+    if isinstance(volume, Volume):
+        if scalars is not None and not (isinstance(scalars, str) and scalars == volume.name):
+            raise InvalidVolumeError(
+                f"the volume has no array {reprlib.repr(scalars)}: its only one is "
+                f"{volume.name!r}; of other values make another, pyvista_vdi.Volume(array, "
+                "spacing, origin)"
+            )
+        return volume
     if hasattr(volume, "GetClassName"):
         if scalars is not None and not isinstance(scalars, str):
             volume, scalars = registry.method("Volume.with_scalars")(volume, scalars, None)
@@ -64,15 +70,6 @@ def _kept_volume(image: Any, scalars: str | None, preference: str) -> Volume:
     volume: Volume = from_vtk(image, scalars, preference)
     forget = functools.partial(_kept.pop, id(image), None)
     _kept[id(image)] = made_of, volume, weakref.ref(image, lambda _: forget())
-    return volume
-
-
-def _with_scalars(volume: Volume, scalars: Any) -> Volume:
-    if scalars is not None and not (isinstance(scalars, str) and scalars == volume.name):
-        raise InvalidVolumeError(
-            f"the volume has no array {reprlib.repr(scalars)}: its only one is {volume.name!r}; of "
-            "other values make another, pyvista_vdi.Volume(array, spacing, origin)"
-        )
     return volume
 
 

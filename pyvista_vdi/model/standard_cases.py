@@ -28,9 +28,6 @@ ANGLES: tuple[float, ...] = (0.0, 5.0, 30.0)
 #: Elevation of V_O above the horizontal plane through the centre, degrees.
 ELEVATION = 20.0
 
-#: Vertical opening angle of V_O, degrees.
-VIEW_ANGLE = 30.0
-
 #: The window of the paper's smaller cases, pixels.
 WINDOW_SIZE: tuple[int, int] = (1280, 720)
 
@@ -44,7 +41,7 @@ def filling_camera(
     window_size: Sequence[int],
     azimuth: float = 0.0,
     elevation: float = ELEVATION,
-    view_angle: float = VIEW_ANGLE,
+    view_angle: float = 30.0,
 ) -> Camera:
     """Return the perspective view that a box just fills; z is up, world units and degrees.
 

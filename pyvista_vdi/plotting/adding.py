@@ -30,6 +30,7 @@ from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import (
     Deferral,
+    DrawingOptions,
     GenerationOptions,
     Option,
     Options,
@@ -38,7 +39,6 @@ from pyvista_vdi.model.options import (
     option,
     record,
 )
-from pyvista_vdi.model.render_options import DrawingOptions
 from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI, picture_view
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper, first_camera

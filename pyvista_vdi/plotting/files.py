@@ -16,7 +16,6 @@ from pyvista_vdi.io.volumes.in_file import REMEDY, Lazy, VolumeInFile, head_of
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.volumes import as_grid
-from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.filters.convert import (
     is_vdi_image,
     vdi_from_image,
@@ -90,12 +89,14 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
     """
     # Legacy files may have any name; what VTK would print is raised
     legacy = head_of(file).startswith(b"# vtk DataFile")
-    with vtk.caught_messages() as window, pv.vtk_verbosity("off"):
+    with pv.VtkErrorCatcher(send_to_logging=False) as caught, pv.vtk_verbosity("off"):
         reader = pv.get_reader(file, force_ext=".vtk" if legacy else None)
         held = reader.read()
-    if "error" in (written := window.GetOutput()).lower():  # of what is no error it warns, too
-        said = written.partition("\n")[2].partition("\n\n")[0].split("): ", 1)[-1]
-        raise InvalidVolumeError(f"{file} cannot be read ({' '.join(said.split())}): write it anew")
+    said = [
+        str(each.alert).splitlines()[-1] for each in caught.events if "error" in str(each).lower()
+    ]
+    if said:  # of what is no error it warns, too
+        raise InvalidVolumeError(f"{file} cannot be read ({said[0]}): write it anew")
     if (steps := getattr(reader.reader, "GetNumberOfSteps", int)()) > 1:
         raise UnsupportedError(f"{file} holds {steps} times, and a volume is one: {REMEDY}")
     grid = pv.wrap(held)

@@ -14,8 +14,7 @@ from typing import Any
 from pyvista_vdi.device import Runtime, get_runtime
 from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.generation.generate import generate_vdi
-from pyvista_vdi.model.options import GenerationRequest, QualityTarget
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest, GenerationRequest, QualityTarget
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.targets import generate_to_target
 from pyvista_vdi.raycasting.raycast import render_vdi

@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.device import get_runtime
@@ -22,9 +22,13 @@ from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, warn_exte
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import SSIM_WINDOW
-from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, QualityTarget
+from pyvista_vdi.model.options import (
+    FrameRequest,
+    GenerationOptions,
+    GenerationRequest,
+    QualityTarget,
+)
 from pyvista_vdi.model.packing import Precision
-from pyvista_vdi.model.render_options import FrameRequest
 from pyvista_vdi.model.types import ClientLike
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import ViewErrorEstimator, world_centre
@@ -290,7 +294,7 @@ def turned(camera: Camera, bounds: Sequence[float], degrees: float) -> Camera:
     axis = np.asarray(camera.view_up) / np.linalg.norm(camera.view_up)
     cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
 
-    def around(point: Sequence[float]) -> NDArray[np.float64]:  # Rodrigues' formula
+    def around(point: ArrayLike) -> NDArray[np.float64]:  # Rodrigues' formula
         v = np.asarray(point) - centre
         along = axis * (axis @ v)
         return np.asarray(centre + along + (v - along) * cosine + np.cross(axis, v) * sine)

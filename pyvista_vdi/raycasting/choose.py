@@ -43,7 +43,7 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     segments    elsewhere                                              ``segments``
     first hits  everywhere                                             ``first_hits``
     a picture   CPU; V_O's view, a list for each pixel; not cropped    ``raycast_aligned_view``
-    a picture   V_O's view, but for cropped ones that blocks can draw  ``raycast``, ONE_LIST=1
+    a picture   V_O's view, but for cropped ones that blocks can draw  ``raycast``, one_list
     a picture   CPU; rays have many lists in common; not cropped       ``raycast_packets``
     a picture   CPU; lists suit blocks                                 ``raycast``, LANES=16
     a picture   all else                                               ``raycast``
@@ -57,10 +57,7 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     lists = prepared.switches  # OFFSET_T, DEPTH, PACKED; DOUBLE_FLOAT_RAYS where it is needed
     compensated = summation(options.preview_samples or prepared.most_media)
     sums: dict[str, int | str] = {"COMPENSATED": compensated}
-    walk: dict[str, int | str] = {
-        "CROPPED": int(bool(scene.cropped.forms)),
-        "SKIP_EMPTY": int(options.skip_empty and prepared.occupancy.worthwhile),
-    }
+    walk: dict[str, int | str] = {"CROPPED": int(bool(scene.cropped.forms))}
     double_float, cropped = prepared.double_float, walk["CROPPED"]
     suit_blocks = not double_float and not prepared.long_offsets
 
@@ -92,7 +89,7 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     if scene.hit is not None:
         return by_columns(
             ("raycasting/first_hits.cl", "first_hits"),
-            {**lists, **walk, "ONE_LIST": int(scene.one_list)},
+            {**lists, **walk},
             least_optical_depth=scene.hit.optical_depth,
             accumulated=int(scene.hit.accumulated),
         )
@@ -109,14 +106,14 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     # Each ray is still in one list: the kernel for single rays has a loop along it. Cropped rays
     # are followed in blocks where they can be
     if scene.one_list and not (cropped and in_blocks):
-        return by_columns(_RAYCAST, {**lists, **walk, **sums, "ONE_LIST": 1})
+        return by_columns(_RAYCAST, {**lists, **walk, **sums, "LANES": 1})
 
     # Rays that have many lists in common
     packets = scene.packets if uncropped else None
     if packets is not None:
-        ways = {"UPRIGHT": int(packets.upright), "SWEEP_V": int(packets.sweep_v)}
-        switches = {**lists, **sums, **ways, "SKIP_EMPTY": walk["SKIP_EMPTY"]}
+        switches = {**lists, **sums}
         across: dict[str, Any] = {"epipole": packets.epipole, "part": packets.part}
+        across |= {"upright": packets.upright, "sweep_v": packets.sweep_v}
         return ChosenKernel(
             ("raycasting/packets.cl", "raycast_packets"),
             switches,
@@ -126,7 +123,7 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
             LANES,
         )
     lanes = LANES if in_blocks else 1
-    switches = {**lists, **walk, **sums, "ONE_LIST": 0, "LANES": lanes}
+    switches = {**lists, **walk, **sums, "LANES": lanes}
     return by_columns(_RAYCAST, switches, lanes)
 
 

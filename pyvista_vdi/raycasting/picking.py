@@ -20,7 +20,7 @@ from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag, as_float, as_range
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.model.vdi import VDI
 
 Floats: TypeAlias = NDArray[np.float64]

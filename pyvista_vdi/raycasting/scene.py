@@ -15,8 +15,8 @@ from pyvista_vdi.device import DeviceBuffer
 from pyvista_vdi.device.constants import BUNDLE, PLANE_FORMS
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.options import FrameRequest, RenderOptions
 from pyvista_vdi.model.ray_forms import Rectangle
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
 from pyvista_vdi.raycasting.packets import LANES, Packets, packets_of
 from pyvista_vdi.raycasting.picking import FirstHit
 from pyvista_vdi.raycasting.prepared import PreparedVDI
@@ -210,13 +210,15 @@ class Scene:
         """Return the arguments that every kernel takes which draws a frame."""
         prepared, cutoff = self.prepared, self.options.transmittance_cutoff
         occupancy = prepared.occupancy
+        skips = self.options.skip_empty and occupancy.worthwhile
+        looks = skips or self.options.preview_samples is not None
         return {
             "headers": prepared.headers,
             "faces": prepared.faces,
             "media": prepared.media,
             "forms": forms,
             "opaque_depth": ends,
-            "masks": occupancy.masks,
+            "masks": occupancy.masks if looks else None,
             "frame": {
                 "lists_wide": prepared.window[0],
                 "lists_high": prepared.window[1],
@@ -230,6 +232,7 @@ class Scene:
                 "depth_step": prepared.depth_step,
                 "nearest_offset": prepared.nearest - prepared.depth_origin,
                 "regions": self.cropped.regions,
+                "one_list": self.one_list,
             },
         }
 

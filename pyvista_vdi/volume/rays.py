@@ -16,8 +16,8 @@ from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.float32_limits import ENTRY_PER_POINT, FAR_ENTRY, MOST_STEPS, NEAR_ENTRY
+from pyvista_vdi.model.options import Planes
 from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed
-from pyvista_vdi.model.render_options import Planes
 from pyvista_vdi.model.volume import Grid
 
 Ends = tuple[float, float, float]
@@ -137,10 +137,10 @@ class Variant:
     scalar, or colours and a scalar (1 or 4 ``components``); whether the ``nearest`` point is
     sampled, and the medium of its scalar looked up (``by_scalar``). Samples are not lit, lit, or
     lit by one headlight and nothing else (``shaded`` 0, 1, 2); opacity may depend on the gradient;
-    voxels may be ``part`` of a grid; what cropping keeps may be no box (``cropped``). With
-    ``double_float``, rays enter the volume so far from where they are formed that float32 does not
-    hold it. ``compensated``: how sums along a ray are kept (``lib/compositing.cl``). ``sharp``, no
-    ``-D`` option: a specular power is so large that cosines round it off.
+    voxels may be ``part`` of a grid. With ``double_float``, rays enter the volume so far from where
+    they are formed that float32 does not hold it. ``compensated``: how sums along a ray are kept
+    (``lib/compositing.cl``). ``sharp``, no ``-D`` option: a specular power is so large that cosines
+    round it off.
     """
 
     voxel: str = "uchar"
@@ -153,7 +153,6 @@ class Variant:
     part: bool = False
     double_float: bool = False
     compensated: int = 0
-    cropped: bool = False
     sharp: bool = False
 
     @cached_property
@@ -170,7 +169,6 @@ class Variant:
             "GRID_PART": self.part,
             "DOUBLE_FLOAT_RAYS": self.double_float,
             "COMPENSATED": self.compensated,
-            "CROPPED": self.cropped,
         }
 
     @property

@@ -12,8 +12,7 @@ from pyvista_vdi.device import DeviceBuffer, Runtime, get_runtime
 from pyvista_vdi.device.constants import block_items
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.options import MediumOptions
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest, MediumOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import SAMPLE_BYTES, Room, StepSampler
@@ -46,9 +45,7 @@ class ClippedRays:
         self.planes = march.planes + len(cropped.planes)
         self.forms = march.packed(*cropped.planes, *cropped.forms)
         self.regions = cropped.regions
-        self.variant = replace(
-            medium.variant, double_float=march.double_float, cropped=bool(cropped.forms)
-        )
+        self.variant = replace(medium.variant, double_float=march.double_float)
 
     def uploaded(
         self, runtime: Runtime, stack: ExitStack

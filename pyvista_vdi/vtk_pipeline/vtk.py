@@ -8,12 +8,10 @@ than that takes. ParaView has a VTK of its own: its plugin imports ``vtkmodules`
 
 from __future__ import annotations
 
-import locale
 import os
 import sys
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
@@ -57,9 +55,6 @@ def _chosen() -> str:
 #: The package of the build that this process uses: "vtkmodules" or "cvista".
 BACKEND = _chosen()
 
-#: Of VTK's output window, while what is written to it is caught.
-_window_lock = threading.RLock()
-
 #: Debian's packages of what VTK's wheels link to and do not bring, and of drawing off-screen.
 _DEBIAN = "libgl1 libegl1 libgl1-mesa-dri libx11-6 libxrender1 libxcursor1 libxft2 libxt6 libsm6"
 
@@ -90,24 +85,6 @@ def weakly(thing: Any) -> Callable[[], Any]:
     held = (globals().get("vtkWeakReference") or __getattr__("vtkWeakReference"))()
     held.Set(thing)
     return held.Get  # type: ignore[no-any-return]
-
-
-@contextmanager
-def caught_messages() -> Iterator[Any]:
-    """Catch what VTK writes to its output window, which is the process's: one thread at a time.
-
-    The locale, which is the process's, too, stays: VTK 9.4 reads legacy files in "C" and leaves it.
-    """
-    with _window_lock:
-        spoken = locale.setlocale(locale.LC_ALL)
-        window = globals().get("vtkOutputWindow") or __getattr__("vtkOutputWindow")
-        before, messages = window.GetInstance(), __getattr__("vtkStringOutputWindow")()
-        window.SetInstance(messages)
-        try:
-            yield messages
-        finally:
-            window.SetInstance(before)
-            locale.setlocale(locale.LC_ALL, spoken)
 
 
 def explain_import_error(error: ImportError) -> MissingDependencyError:

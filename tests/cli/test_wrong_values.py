@@ -26,7 +26,7 @@ RIGHT = {
     "serve": "v.npy --port 0 --shade",
     "info": "v.npy",
     "compare": "v.npy --out new --size 12x8 --angles 5 --repeats 1 --no-vtk --shade",
-    "tradeoff": "v.npy --out new --quick --no-vtk --shade",
+    "tradeoff": "v.npy --out new --no-vtk --shade",
     "convert": "a.vdi -o old.vdi",
     "series": "v.npy -o old.vdis --size 12x8 --shade",
     "set": "v.npy -o old.vdiset --size 16x12 --shade",

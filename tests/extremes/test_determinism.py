@@ -10,7 +10,7 @@ from drawing import generate_vdi, render_vdi
 from extreme_scenes import transfer, turned, view
 
 from pyvista_vdi import Volume
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes

@@ -11,7 +11,7 @@ from drawing import generate_vdi, raycast_volume, render_vdi
 from pyvista_vdi import VDI, Camera, TransferFunction, Volume
 from pyvista_vdi.errors import InvalidCameraError
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.render_options import RenderOptions
+from pyvista_vdi.model.options import RenderOptions
 from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.view import coverage
 from pyvista_vdi.quality.view_error import (

@@ -42,7 +42,7 @@ __kernel void frame_layout(int count, __global int *result)
     const int found[] = {OFFSET(lists_wide), OFFSET(lists_high), OFFSET(width), OFFSET(height), OFFSET(planes),
                          OFFSET(depth_origin), OFFSET(cutoff), OFFSET(first_depth), OFFSET(slabs_per_depth),
                          OFFSET(depth_step), OFFSET(nearest_offset), OFFSET(regions),
-                         sizeof(Frame)};
+                         OFFSET(one_list), sizeof(Frame)};
     if (get_global_id(0) == 0) {
         for (int n = 0; n < count; ++n)
             result[n] = found[n];

@@ -10,7 +10,7 @@ from ray_scenes import reciprocal_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.model.host_memory import aligned_empty
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF
+from pyvista_vdi.model.options import TRANSMITTANCE_CUTOFF
 
 SIZE = (31, 17)
 

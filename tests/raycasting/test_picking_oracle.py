@@ -14,7 +14,7 @@ from ray_scenes import random_cropping, random_ends, reciprocal_vdi
 from reference import raycast as oracle
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.model.render_options import FrameRequest, RenderOptions
+from pyvista_vdi.model.options import FrameRequest, RenderOptions
 from pyvista_vdi.raycasting.picking import FirstHit
 from pyvista_vdi.raycasting.raycast import render_first_hits
 

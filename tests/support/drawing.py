@@ -6,8 +6,14 @@ from dataclasses import replace
 
 from pyvista_vdi.generation import generate
 from pyvista_vdi.model.chunked import ChunkedArray
-from pyvista_vdi.model.options import GenerationOptions, GenerationRequest, MediumOptions
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
+from pyvista_vdi.model.options import (
+    TRANSMITTANCE_CUTOFF,
+    FrameRequest,
+    GenerationOptions,
+    GenerationRequest,
+    MediumOptions,
+    RenderOptions,
+)
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting import multi_vdi, raycast
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit

@@ -22,7 +22,7 @@ from pyvista_vdi.cli.inputs import (
     refuse,
 )
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
-from pyvista_vdi.cli.text import mebibytes, printable
+from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError, naming
 from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.series import Called, VDISeries, check_range
@@ -77,7 +77,8 @@ def series(options: argparse.Namespace) -> int:
             make = StepMaker("series", view, options.size, **how)
         how = {"precision": "8-byte", **file_options(options)}
         target = vdis.save(options.output, progress=bar, **how)
-    print(f"{printable(options.output)}: {len(vdis)} steps, {mebibytes(target.stat().st_size)}")
+    size = f"{target.stat().st_size / 2**20:.1f} MiB"
+    print(f"{printable(options.output)}: {len(vdis)} steps, {size}")
     return 0
 
 

@@ -11,8 +11,8 @@ from pyvista_vdi.extensions.web import shown as of_viewers
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.shown import MOST_PLANES, camera_of, viewer_camera
 from pyvista_vdi.model.metrics import check_background
+from pyvista_vdi.model.options import checked_planes
 from pyvista_vdi.model.packing import DEPTH_CODES
-from pyvista_vdi.model.render_options import checked_planes
 from pyvista_vdi.model.vdi import picture_view
 
 try:

@@ -10,7 +10,7 @@ from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.picking import Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
-from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refusing
+from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refuse
 from pyvista_vdi.vtk_pipeline.drawing.screen import place_image, show_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import input_of
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
@@ -22,7 +22,6 @@ from pyvista_vdi.vtk_pipeline.vtk import (
 )
 
 
-@refusing(OF_ACTORS)
 class VDIActorMethods:
     """What makes a volume show a VDI; mixed into VTK's and into PyVista's."""
 
@@ -261,6 +260,9 @@ class VDIActorMethods:
     def camera_to_come(self, renderer: Any) -> Any:
         """Return the ``vtkCamera`` of a renderer's next picture."""
         return camera_to_come(renderer)
+
+
+refuse(VDIActorMethods, OF_ACTORS)
 
 
 class VDIActor(VDIActorMethods, vtkVolume):

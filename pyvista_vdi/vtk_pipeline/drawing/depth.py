@@ -88,7 +88,8 @@ def _is_before(frames: Sequence[Frame]) -> bool:
             continue
         if drawing is None:  # there is something else than volumes
             drawing = [thing for own in frames for thing in consumers(own.actor)]
-            farthest = max(own.depths_of(own.bounds)[1] for own in frames)
+            of = ((own.camera.model_transform, own.bounds) for own in frames)
+            farthest = max(depths_of(*each)[1] for each in of)
         if prop in drawing:
             return True
         if prop.HasOpaqueGeometry():

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.render_options import RenderOptions
+from pyvista_vdi.model.options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.quality.costs import RenderMode
@@ -51,6 +51,7 @@ class Frame:
     model_transform: Matrix  # the actor's matrix, (4, 4)
     vdi: VDI | None = None  # what is seen: see showing()
     volume: Any = None  # the VolumePicture that is seen in place of a VDI
+    way: RenderMode = "vdi"  # what is raycast
     seen: Any = None  # a weak reference to that, by which it is known
     effort: float = 1.0  # what a ray is expected to take over one from the VDI's own view
     angle: float = 0.0  # between the view and that of the VDI, degrees; 0 for a volume
@@ -113,7 +114,7 @@ class Frame:
         )
         known |= {"seen": weakref.ref(seen), "bounds": seen.bounds, "options": options}
         if not isinstance(seen, VDI):
-            return replace(self, volume=seen, **known)
+            return replace(self, volume=seen, way="volume", **known)
         angle = angle_from_generating_view(seen, self.view.camera)
         return replace(self, vdi=seen, angle=angle, effort=costs.rise(angle), **known)
 
@@ -124,11 +125,6 @@ class Frame:
         of = (self.seen, self.camera, self.size, self.full_size, self.options)
         numbers = None if self.depth is None else self.projection.tobytes()
         return (*of, self.lit_from, blend, numbers)
-
-    @property
-    def way(self) -> RenderMode:
-        """What is raycast."""
-        return "vdi" if self.volume is None else "volume"
 
     def coarser(self, size: tuple[int, int]) -> Frame:
         """Return the same view with fewer pixels, which fill the viewport just as exactly.
@@ -148,8 +144,6 @@ class Frame:
             edges = zip(size[::-1], depth.shape, strict=True)
             depth = depth[np.ix_(*((2 * np.arange(n) + 1) * full // (2 * n) for n, full in edges))]
         frame = replace(self, size=size, camera=camera, to_view=stretch @ self.to_view, depth=depth)
-        if not self.bounds:
-            return frame
         planes = frame._clipping_planes(self.bounds)
         return replace(frame, options=self.options.replace(clipping_planes=planes))
 
@@ -164,7 +158,7 @@ class Frame:
             table, turn = np.array(planes), self.to_view[:3, :3]
             origins = table[:, :3] @ turn.T + self.to_view[:3, 3]
             rows = np.hstack([origins, table[:, 3:] @ np.linalg.inv(turn)]).tolist()
-        nearest, farthest = self.depths_of(bounds)
+        nearest, farthest = depths_of(self.camera.model_transform, bounds)
         near, far = (float(d) for d in self.view_depth(np.array([0.0, 1.0])))
         slack = _PLANE_SLACK * max(abs(nearest), abs(farthest))
         if near > nearest + slack:
@@ -172,10 +166,6 @@ class Frame:
         if far < farthest - slack:
             rows.append([0, 0, -far, 0, 0, 1])
         return rows
-
-    def depths_of(self, bounds: tuple[float, ...]) -> tuple[float, float]:
-        """Return the least and the largest view depth of a box in the model frame."""
-        return depths_of(self.camera.model_transform, bounds)
 
     def rectangle(self, bounds: tuple[float, ...], margin: float = 0.0) -> Matrix | None:
         """Return what bounds cover of the viewport, pixels, float64 rows (low, high) by (x, y).

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +12,7 @@ from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import aligned_empty
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.quality.costs import RenderMode
 from pyvista_vdi.raycasting.multi_vdi import blended
 from pyvista_vdi.raycasting.raycast import render_vdi
@@ -22,8 +21,6 @@ from pyvista_vdi.volume.render import picture_room, raycast_medium, raycast_volu
 from pyvista_vdi.vtk_pipeline.drawing.depth import ends_of_rays
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Image
 from pyvista_vdi.vtk_pipeline.filters.source import Request
-
-_numbers = itertools.count()
 
 
 class VolumePicture:
@@ -42,8 +39,6 @@ class VolumePicture:
 
     Attributes
     ----------
-    number : int
-        By which it is known.
     bounds : tuple of float
         The volume's, model frame.
     shaded : bool
@@ -59,7 +54,6 @@ class VolumePicture:
 
     def __init__(self, request: Request, *, in_bricks: bool = False) -> None:
         self.request = request
-        self.number = next(_numbers)
         self.bounds = request.volume.bounds
         self.shaded = request.transfer_function.shading is not None
         self.pictures = 0

@@ -13,8 +13,8 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
-from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refusing
-from pyvista_vdi.vtk_pipeline.drawing.settings import with_settings
+from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refuse
+from pyvista_vdi.vtk_pipeline.drawing.settings import add_settings
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
@@ -34,8 +34,6 @@ def _on_end(mapper: Any, event: str) -> None:
     mapper.driver.box.end()
 
 
-@with_settings
-@refusing(OF_MAPPERS)
 class VDIMapperMethods:
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
@@ -170,6 +168,10 @@ class VDIMapperMethods:
     def _set_input(self: Any, source: Input | None) -> None:
         self.driver.set_input(source)
         self.Modified()
+
+
+refuse(VDIMapperMethods, OF_MAPPERS)
+add_settings(VDIMapperMethods)
 
 
 class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):

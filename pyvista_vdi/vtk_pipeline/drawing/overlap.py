@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pyvista_vdi.errors import UnsupportedError
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.raycasting.multi_vdi import OwnedImage, PlacedVDI, owned_image
 from pyvista_vdi.vtk_pipeline.drawing.depth import ends_of_rays, opaque_depth
-from pyvista_vdi.vtk_pipeline.drawing.frame import Frame
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, depths_of
 from pyvista_vdi.vtk_pipeline.drawing.images import Drawn
 from pyvista_vdi.vtk_pipeline.interaction.window import ShownVolume, now
 
@@ -53,7 +53,7 @@ class Group:
             ]
             # The nearest first: in samples of a pixel where a mesh hides its box none is seen
             self.frames = [frame for frame in seen if frame is not None]
-            self.frames.sort(key=lambda frame: frame.depths_of(frame.bounds)[0])
+            self.frames.sort(key=lambda f: depths_of(f.camera.model_transform, f.bounds)[0])
             mine = [own]
         if len(self.frames) == 1:
             return None

@@ -23,7 +23,7 @@ from pyvista_vdi.errors import (
     warn_external,
 )
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.render_options import RenderOptions
+from pyvista_vdi.model.options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import View, coverage
 from pyvista_vdi.quality.background import BackgroundThread, Job, vdi_job
@@ -131,7 +131,14 @@ class Planner:
                     _log.debug("the volume cannot be drawn itself", exc_info=unable)
                     kind: Any = "none" if planned.in_bricks or seen.volume != "whole" else "bricks"
                     self._refused = (planned.content, kind)
-                    seen = replace(seen, first_look=False, volume=kind, **self._going_on())
+                    seen = replace(
+                        seen,
+                        first_look=False,
+                        volume=kind,
+                        making=self.making,
+                        estimating=self._asked is not None and self.making is None,
+                        failed=self._stamp in self.failed,
+                    )
         except Cancelled as error:
             if self._volume is None and source.last() is None:
                 raise
@@ -165,16 +172,6 @@ class Planner:
         blended = len(parts) > 1 and parts[0][0] is vdi
         full = not frame.window.previews(self.settings)
         return frame.showing(vdi, full=full, parts=tuple(parts) if blended else ())
-
-    def _going_on(self) -> dict[str, Any]:
-        """Return what is being made, and what was, as fields of :class:`Seen`."""
-        return {
-            "making": self.making,
-            "estimating": self._asked is not None and self.making is None,
-            "estimate": self.estimate,
-            "failed": self._stamp in self.failed,
-            "costs": self.costs,
-        }
 
     def _look(self, source: SourceInput, frame: Frame, *, joint: bool, one_view: bool) -> Seen:
         """Look at all that decides what the frame shows."""
@@ -235,7 +232,11 @@ class Planner:
             volume=volume,  # type: ignore[arg-type]
             late=late,
             seconds=1 / (window.pace.headroom * window.rate(settings)) if previews else None,
-            **self._going_on(),
+            making=self.making,
+            estimating=self._asked is not None and self.making is None,
+            estimate=self.estimate,
+            failed=stamp in self.failed,
+            costs=self.costs,
         )
         self.seen = seen if watched else None
         if watched:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import Any
 
 from pyvista_vdi.errors import UnsupportedError
-
-_Class = TypeVar("_Class", bound=type)
 
 #: Methods of VTK's GPU volume mapper by why they are refused. What turns a thing off is accepted.
 OF_MAPPERS: Mapping[str, tuple[str, ...]] = {
@@ -41,24 +39,19 @@ OF_ACTORS: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def refusing(methods: Mapping[str, tuple[str, ...]]) -> Callable[[_Class], _Class]:
-    """Return a decorator of classes whose methods of these names raise, and say why."""
-
-    def refusing_them(of: _Class) -> _Class:
-        for reason, names in methods.items():
-            for name in names:
-                setattr(of, name, _refusal(name, reason))
-        return of
-
-    return refusing_them
+def refuse(of: type, methods: Mapping[str, tuple[str, ...]]) -> None:
+    """Have methods of a class raise, and say why."""
+    for reason, names in methods.items():
+        for name in names:
+            setattr(of, name, _refusal(name, reason))
 
 
 def _refusal(name: str, reason: str) -> Callable[..., None]:
-    def refuse(self: Any, *args: Any) -> None:
+    def refused(self: Any, *args: Any) -> None:
         off = name.startswith("Set") and args and (args[-1] is None or args[-1] == 0)
         if not off:
             raise UnsupportedError(f"{name} is not for a VDI: {reason}")
 
-    refuse.__name__ = refuse.__qualname__ = name
-    refuse.__doc__ = f"Refuse: {reason}."
-    return refuse
+    refused.__name__ = refused.__qualname__ = name
+    refused.__doc__ = f"Refuse: {reason}."
+    return refused

@@ -104,6 +104,17 @@ _LOOKUP = f"""
   finalizeRayCast();
 """
 
+#: Where volumes are peeled VTK has its ray caster draw what lies between two layers of translucent
+#: geometry, again and again, and ``castRay`` is called from what stands in place of the call. The
+#: picture cannot be taken apart: it is given whole to what begins at the near plane, and so lies
+#: before all that is translucent, as without peeling of volumes.
+_PEELED = f"""
+#define castRay(zStart, zEnd) ((zStart) > 0.0 ? vec4(0.0) : \\
+  (g_fragColor = texture(vdiImage, (gl_FragCoord.xy - {_VIEWPORT}.xy) * {_VIEWPORT}.zw)))
+//VTK::CallWorker::Impl
+#undef castRay
+"""
+
 #: For boxes that float32 cannot place: one about the origin, whose front or back face, whichever is
 #: not culled, is made the viewport, at the near plane.
 _FILL = """
@@ -117,7 +128,6 @@ _POSITION = "//VTK::ComputeClipPos::Impl"
 _REPLACED = {
     "//VTK::Base::Dec": _DECLARATION,
     "//VTK::CustomUniforms::Dec": _UNIFORMS,
-    "//VTK::CallWorker::Impl": _LOOKUP,
     "//VTK::ComputeLighting::Dec": "",
     "//VTK::ComputeColor::Dec": "",
     "//VTK::Shading::Impl": "",
@@ -125,11 +135,18 @@ _REPLACED = {
 }
 
 
-def show_image(actor: Any) -> None:
-    """Make an actor's shader look its colours up in an image of the viewport."""
+def show_image(actor: Any, renderer: Any = None) -> None:
+    """Make an actor's shader look its colours up in an image of the viewport, as a renderer draws.
+
+    A property that is modified has the shader rebuilt, so what is in place is left.
+    """
     shader = actor.GetShaderProperty()
-    for tag, text in _REPLACED.items():
-        shader.AddFragmentShaderReplacement(tag, True, text, False)
+    peeled = renderer is not None and renderer.GetUseDepthPeelingForVolumes()
+    looked_up = _PEELED if peeled and renderer.GetUseDepthPeeling() else _LOOKUP
+    if vars(shader).get("looked_up") != looked_up:
+        vars(shader)["looked_up"] = looked_up
+        for tag, text in {**_REPLACED, "//VTK::CallWorker::Impl": looked_up}.items():
+            shader.AddFragmentShaderReplacement(tag, True, text, False)
 
 
 def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:
@@ -142,10 +159,7 @@ def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int,
 
 
 def fill_viewport(actor: Any, edge: float | None) -> None:
-    """Fill the viewport with a cube about the origin, of that edge; ``None``: boxes are boxes.
-
-    A property that is modified has the shader rebuilt, so what is in place is left.
-    """
+    """Fill the viewport with a cube about the origin, of that edge; ``None``: boxes are boxes."""
     shader = actor.GetShaderProperty()
     text = None if edge is None else _FILL.format(scale=2 / edge)
     if text == vars(shader).get("filled"):

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 from pyvista_vdi.model.checks import Number, as_flag
-from pyvista_vdi.model.options import Option, declared
-from pyvista_vdi.model.render_options import TRANSMITTANCE_CUTOFF, DrawingOptions, RenderOptions
+from pyvista_vdi.model.options import (
+    TRANSMITTANCE_CUTOFF,
+    DrawingOptions,
+    Option,
+    RenderOptions,
+    declared,
+)
 from pyvista_vdi.model.types import Draw, Policy
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, checked_opacity
-
-_Class = TypeVar("_Class", bound=type)
 
 
 @dataclass(frozen=True)
@@ -85,14 +88,13 @@ SETTINGS: Mapping[str, Option] = {
 }
 
 
-def with_settings(cls: _Class) -> _Class:
+def add_settings(of: type) -> None:
     """Add to a class of mappers VTK's Set and Get of each setting."""
     for name, told in SETTINGS.items():
         for verb, method in zip(("Set", "Get"), _pair(told), strict=True):
             method.__name__ = f"{verb}{name}"
-            method.__qualname__ = f"{cls.__name__}.{method.__name__}"
-            setattr(cls, method.__name__, method)
-    return cls
+            method.__qualname__ = f"{of.__name__}.{method.__name__}"
+            setattr(of, method.__name__, method)
 
 
 def _pair(told: Option) -> tuple[Callable[..., None], Callable[..., Any]]:

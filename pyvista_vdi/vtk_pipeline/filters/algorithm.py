@@ -53,11 +53,9 @@ class Algorithm(vtk.VTKPythonAlgorithmBase):
         """Bring the output up to date, and raise what went wrong."""
         self._python_waits = True
         try:
-            if args:
-                super().Update(*args)
-                done = True
-            else:  # what vtkAlgorithm.Update() does, which does not say whether it went well
-                done = self.GetExecutive().Update(0 if self.GetNumberOfOutputPorts() else -1)
+            # What vtkAlgorithm.Update() does, which does not say whether it went well
+            port = 0 if self.GetNumberOfOutputPorts() else -1
+            done = self.GetExecutive().Update(*(args or (port,)))
         finally:
             self._python_waits = False
         error, self._error = self._error, None
@@ -126,11 +124,6 @@ def named_pair(name: str, what: str, *methods: Callable[..., Any]) -> Any:
     return methods
 
 
-def checked_size(*size: Any) -> tuple[int, int] | None:
-    """Return a window's size, given as two numbers or as a pair; ``None`` as it is."""
-    return None if size == (None,) else check_window_size(size[0] if len(size) == 1 else size)
-
-
 class HeldByVTK:
     """A VTK object that an attribute keeps alive in C++ alone: what the user hands to an algorithm.
 
@@ -152,6 +145,14 @@ class SceneAlgorithm(Algorithm):
     """An algorithm with a view, a device and a volume property, whose changes it follows."""
 
     SetDevice, GetDevice = accessors("device", "the OpenCL device; ``None`` is the default one")
+    SetWindowSize, GetWindowSize = accessors(
+        "window_size",
+        "the pictures' width and height in pixels, as two numbers or one pair; ``None``: that of a "
+        "mapper's first frame for a ``VDISource``, :attr:`VDI.picture_size` for ``VDIToImage``",
+        check=lambda *size: (
+            None if size == (None,) else check_window_size(size[0] if len(size) == 1 else size)
+        ),
+    )
     _, GetCamera = accessors("camera", "the view, as it was set; ``None`` where none was")
 
     _property: HeldByVTK | None = None

@@ -13,7 +13,7 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.model.checks import Number
 from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.render_options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.model.vdi import VDI, picture_view
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.raycasting.raycast import render_vdi
@@ -23,7 +23,6 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     accessors,
     announce,
     ask_for_all,
-    checked_size,
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, to_vtk, vdi_from_image
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
@@ -65,11 +64,6 @@ class VDIToImage(SceneAlgorithm):
     )
     SetElevation, GetElevation = accessors(
         "elevation", "by how much the view is lifted after turning it, degrees", 0.0, _DEGREES
-    )
-    SetWindowSize, GetWindowSize = accessors(
-        "window_size",
-        "the picture's width and height in pixels; ``None`` is :attr:`VDI.picture_size`",
-        check=checked_size,
     )
 
     def __init__(self) -> None:

@@ -15,7 +15,6 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
-from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.vtk_pipeline.filters.algorithm import wanted_time
@@ -302,7 +301,6 @@ class DeferredInput(Input):
         self.prop, self._values, self._bounds, self._camera = prop, values, bounds, camera
         self._view: View | None = None
         self._made_at: Any = None
-        self._look: TransferFunction | None = None  # of the VDI that was made last
 
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
@@ -329,9 +327,7 @@ class DeferredInput(Input):
         """Return the VDI that the property makes of the values now; ``None`` without a view."""
         values, stamp = self.deferred, self.stamp()
         if values is not None and (self._vdi is None or self._made_at != stamp):
-            look = transfer_function_from_property(self.prop)
-            if self._vdi is None or self._look != look:  # the time stamp alone says little
-                self._vdi, self._look = classify_on_device(values, look), look
+            self._vdi = classify_on_device(values, transfer_function_from_property(self.prop))
             self._made_at = stamp
         return self._vdi
 

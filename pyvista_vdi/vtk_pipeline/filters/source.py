@@ -36,7 +36,6 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     accessors,
     announce,
     ask_for_all,
-    checked_size,
     named_pair,
     wanted_time,
 )
@@ -98,11 +97,6 @@ class VDISource(SceneAlgorithm):
 
     bad_input = InvalidVolumeError
 
-    SetWindowSize, GetWindowSize = accessors(
-        "window_size",
-        "the screen's width and height in pixels, as two numbers or one pair",
-        check=checked_size,
-    )
     SetScalars, GetScalars = accessors(
         "scalars",
         "the array by its name, ``None`` for the active scalars, and which is preferred where "
@@ -246,7 +240,8 @@ class VDISource(SceneAlgorithm):
         The volume and its property are shared; what is set of one is not set of the other.
         """
         other = VDISource()
-        other.SetInputConnection(self.GetInputConnection(0, 0))
+        if self.GetNumberOfInputConnections(0) > 0:
+            other.SetInputConnection(self.GetInputConnection(0, 0))
         other.SetVolumeProperty(self.GetVolumeProperty())
         other.lit_by.Set(self.lit_by.Get())
         other._set, other.placed = dict(self._set), self.placed

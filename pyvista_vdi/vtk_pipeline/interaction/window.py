@@ -35,7 +35,7 @@ _INTERACTIVE = 1.0
 _RATE = 30.0
 
 #: By the windows' addresses.
-_windows: dict[str, weakref.ref[Window]] = {}
+_windows: weakref.WeakValueDictionary[str, Window] = weakref.WeakValueDictionary()
 
 
 def now() -> float:
@@ -116,13 +116,9 @@ class Window:
     def of(cls, window: Any) -> Window:
         """Return that of a VTK window, made on first use."""
         address = window.GetAddressAsString("")
-        known = _windows.get(address)
-        found = None if known is None else known()
+        found = _windows.get(address)
         if found is None or found._window() is not window:
-            for gone in [key for key, each in list(_windows.items()) if each() is None]:
-                _windows.pop(gone, None)
-            found = cls(window)
-            _windows[address] = weakref.ref(found)
+            found = _windows[address] = cls(window)
         return found
 
     def shown_in(self, renderer: Any) -> list[ShownVolume]:
