@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError
+from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError, UnsupportedError
 from pyvista_vdi.io import read, write
 from pyvista_vdi.io.axes import to_world
-from pyvista_vdi.io.volumes.in_file import Lazy, VolumeInFile, head_of
+from pyvista_vdi.io.volumes.in_file import REMEDY, Lazy, VolumeInFile, head_of
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.plotting.volumes import as_grid
@@ -90,12 +90,15 @@ def volumes_in(file: Path) -> list[VolumeInFile]:
     # Legacy files may have any name; what VTK would print is raised
     legacy = head_of(file).startswith(b"# vtk DataFile")
     with pv.VtkErrorCatcher(send_to_logging=False) as caught, pv.vtk_verbosity("off"):
-        held = pv.get_reader(file, force_ext=".vtk" if legacy else None).read()
+        reader = pv.get_reader(file, force_ext=".vtk" if legacy else None)
+        held = reader.read()
     said = [
         str(each.alert).splitlines()[-1] for each in caught.events if "error" in str(each).lower()
     ]
     if said:  # of what is no error it warns, too
         raise InvalidVolumeError(f"{file} cannot be read ({said[0]}): write it anew")
+    if (steps := getattr(reader.reader, "GetNumberOfSteps", int)()) > 1:
+        raise UnsupportedError(f"{file} holds {steps} times, and a volume is one: {REMEDY}")
     grid = pv.wrap(held)
     if isinstance(grid, pv.MultiBlock):  # of several blocks it is the only uniform one, or the only
         blocks = [*grid.recursive_iterator(skip_none=True)]
