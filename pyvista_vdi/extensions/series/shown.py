@@ -56,11 +56,6 @@ class SeveralInput(Input):
         self._unsaid: list[Exception] = []  # why they are
         self._worker = BackgroundThread(thread)
 
-    def classified_by(self, prop: Any) -> Input:
-        """Set the property that classifies the values of all VDIs from now on."""
-        self.prop = prop
-        return self
-
     def on_devices(self) -> list[Any]:
         """Return the VDIs that are ready, and what was classified of that which is shown."""
         with self._lock:
@@ -194,12 +189,6 @@ class SeriesInput(SeveralInput):
     def stamp(self) -> Any:
         """Return the step, and the time stamp of what classifies it."""
         return self.step, self.prop and (id(self.prop), self.prop.GetMTime())
-
-    def shared(self) -> Input:
-        """Return an input that shows the same step, and plays by itself."""
-        other = SeriesInput(self.collection)
-        other.step, other.prop = self.step, self.prop
-        return other
 
     def look(self, camera: Camera, device: Any) -> None:
         """Read for a device."""

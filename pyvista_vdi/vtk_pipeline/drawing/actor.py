@@ -66,8 +66,6 @@ class VDIActorMethods:
     def SetProperty(self: Any, prop: Any) -> None:
         """Set the volume property, from which the VDI is regenerated.
 
-        What is shared with a copy of this actor is not changed for the other.
-
         Parameters
         ----------
         prop : vtkVolumeProperty
@@ -80,37 +78,11 @@ class VDIActorMethods:
         """
         mapper = self.GetMapper()
         source = None if mapper is None else mapper.GetSource()
-        if source is not None and prop is not source.GetVolumeProperty():
-            mapper.own_source("its property").SetVolumeProperty(prop)
-        elif mapper is not None and (shown := mapper.driver.input) is not None:
-            mine = shown.classified_by(prop)
-            if mine is not shown:
-                mapper.SetInputData(mine)
+        if source is not None:
+            source.SetVolumeProperty(prop)
+        elif mapper is not None and mapper.driver.input is not None:
+            mapper.driver.input.prop = prop
         super().SetProperty(prop)  # type: ignore[misc]
-
-    def ShallowCopy(self: Any, other: Any) -> None:
-        """Show what another actor shows, by a copy of its mapper, which is of one actor.
-
-        Place, property and visibility are VTK's to copy: the property is shared.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it has an ordinary volume mapper.
-        """
-        mapper = other.GetMapper() if hasattr(other, "GetMapper") else None
-        copied = mapper
-        if isinstance(mapper, VDIMapperMethods):
-            copied = mapper.NewInstance()
-            copied.ShallowCopy(mapper)
-        self.SetMapper(copied)  # which refuses VTK's
-        super().ShallowCopy(other)  # type: ignore[misc]
-        self._become_vdi_actor()  # VTK has it share the other one's shader
-        self.SetMapper(copied)
-
-    def NewInstance(self) -> VDIActorMethods:
-        """Return another actor of this class, with nothing to show yet."""
-        return type(self)()
 
     @property
     def vdi(self: Any) -> VDI | None:

@@ -108,8 +108,7 @@ class Driver(Planner):
         actor, renderer = self.actor(), self.renderer()
         if renderer is None or not _is_drawing(renderer):
             self.warn(
-                "VDIMapper draws only behind its own VDIActor: use VDIActor in place of vtkVolume, "
-                "also for copies (VDIActor().ShallowCopy(actor))"
+                "VDIMapper draws only behind its own VDIActor: use VDIActor in place of vtkVolume"
             )
             return
         # VTK asks for four where the actor's property says that they are dependent

@@ -90,16 +90,8 @@ class Input:
         """Return the VDIs, values and volumes that devices may hold because of this."""
         return [self._vdi]
 
-    def shared(self) -> Input:
-        """Return an input of the same VDI for another mapper."""
-        return self
-
     def watch(self, changed: Callable[..., Any] | None) -> None:
         """Call this when what is before it may be another; ``None`` ends it."""
-
-    def classified_by(self, prop: Any) -> Input:
-        """Return an input whose values, where they are kept, another property classifies."""
-        return self
 
     def rest(self) -> None:
         """End what goes on in the background, which may begin anew."""
@@ -132,12 +124,6 @@ class SourceInput(Input):
         self._tag: int | None = None
         self._camera: Camera | None = None  # what frames gave, which nobody has set
         self._size: tuple[int, int] | None = None
-
-    def shared(self) -> SourceInput:
-        """Return an input from a source of its own, with the same settings and VDI."""
-        other = SourceInput(self.source.Copy())
-        other._camera, other._size, other.of_scene = self._camera, self._size, self.of_scene
-        return other
 
     def watch(self, changed: Callable[..., Any] | None) -> None:
         """Call back when the source has been modified."""
@@ -330,12 +316,6 @@ class DeferredInput(Input):
             self._vdi = classify_on_device(values, transfer_function_from_property(self.prop))
             self._made_at = stamp
         return self._vdi
-
-    def classified_by(self, prop: Any) -> Input:
-        """Return one of the same values: whoever shares this one keeps the property."""
-        other = DeferredInput(self._values, prop, self._bounds, self._camera)
-        other._view = self._view
-        return other
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds in the model frame."""

@@ -234,21 +234,6 @@ class VDISource(SceneAlgorithm):
         """Return the volume at the input, read again only if it has changed; raises if none is."""
         return self._read(self.UpdateInput())
 
-    def Copy(self) -> VDISource:
-        """Return another source with this one's input, settings and VDI.
-
-        The volume and its property are shared; what is set of one is not set of the other.
-        """
-        other = VDISource()
-        if self.GetNumberOfInputConnections(0) > 0:
-            other.SetInputConnection(self.GetInputConnection(0, 0))
-        other.SetVolumeProperty(self.GetVolumeProperty())
-        other.lit_by.Set(self.lit_by.Get())
-        other._set, other.placed = dict(self._set), self.placed
-        other._volume, other._volume_key = self._volume, self._volume_key
-        other._vdi, other._request = self._vdi, self._request
-        return other
-
     def UpdateInput(self) -> Any:
         """Return the data at the input, up to date and as of the time that is asked of the source.
 
