@@ -35,24 +35,15 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
 
     @dataset.setter
     def dataset(self, volume: Any) -> None:
-        if self.GetSource() is None:
-            super().SetInputDataObject(volume)  # a VDI, or refused by name
-        else:
-            self.GetSource().SetInputDataObject(volume)
-
-    def SetInputDataObject(self, *args: Any) -> None:  # noqa: N802
-        """Draw another volume as this one, or a VDI in its canonical form."""
-        if self.GetSource() is None or is_vdi_image(args[-1]):
-            super().SetInputDataObject(*args)
-        else:
-            self.dataset = args[-1]
+        self.SetInputData(volume)
 
     def SetInputData(self, data: Any) -> None:  # noqa: N802
         """Draw another volume as this one, or a VDI, or its canonical image."""
-        if self.GetSource() is None or not isinstance(data, vtkImageData) or is_vdi_image(data):
+        source = self.GetSource()
+        if source is None or not isinstance(data, vtkImageData) or is_vdi_image(data):
             super().SetInputData(data)
         else:
-            self.dataset = data
+            source.SetInputDataObject(data)
 
 
 class PlotterVDIActor(VDIActorMethods, Volume):

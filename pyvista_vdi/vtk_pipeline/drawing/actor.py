@@ -12,7 +12,7 @@ from pyvista_vdi.raycasting.picking import Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refuse
 from pyvista_vdi.vtk_pipeline.drawing.screen import place_image, show_image
-from pyvista_vdi.vtk_pipeline.filters.inputs import input_of
+from pyvista_vdi.vtk_pipeline.filters.source import input_of
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import (
@@ -217,16 +217,16 @@ class VDIActorMethods:
         driver.failed = ()
         driver.said.clear()
         matrix = as_array(self.GetMatrix())
-        renderer, shown = driver.renderer(), driver.input
-        shown.note_scene(driver.renderers, matrix)
+        renderer = driver.renderer()
+        source.note_scene(driver.renderers, matrix)
         if camera is not None:
             source.SetCamera(camera, matrix)
         elif renderer is not None:
-            shown.take_camera(self.camera_to_come(renderer), matrix)
+            source.take_camera(self.camera_to_come(renderer), matrix)
         if window_size is not None:
             source.SetWindowSize(window_size)
         elif renderer is not None and min(renderer.GetSize()) > 0:
-            shown.take_size(size_of(renderer))
+            source.take_size(size_of(renderer))
         return source.GetVDI()  # type: ignore[no-any-return]
 
     def camera_to_come(self, renderer: Any) -> Any:

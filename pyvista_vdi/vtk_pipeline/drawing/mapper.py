@@ -15,8 +15,8 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refuse
 from pyvista_vdi.vtk_pipeline.drawing.settings import add_settings
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
-from pyvista_vdi.vtk_pipeline.filters.source import VDISource
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.filters.source import VDISource, input_of, input_of_port
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
@@ -102,12 +102,12 @@ class VDIMapperMethods:
         source = self.driver.input
         if source is None:
             return None
-        return source.last() if isinstance(source, SourceInput) else source.vdi()
+        return source.last() if isinstance(source, VDISource) else source.vdi()
 
     def GetSource(self) -> VDISource | None:
         """Return the :class:`VDISource` at the input, if it is one."""
         source = self.driver.input
-        return source.source if isinstance(source, SourceInput) else None
+        return source if isinstance(source, VDISource) else None
 
     def SetDevice(self, device: Any) -> None:
         """Choose the OpenCL device; ``None`` is the default one."""
