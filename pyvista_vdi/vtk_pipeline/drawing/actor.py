@@ -13,9 +13,10 @@ from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refuse
 from pyvista_vdi.vtk_pipeline.drawing.screen import place_image, show_image
 from pyvista_vdi.vtk_pipeline.filters.source import input_of
-from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, framed, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkCamera,
     vtkOpenGLShaderProperty,
     vtkVolume,
     weakly,
@@ -230,8 +231,10 @@ class VDIActorMethods:
         return source.GetVDI()  # type: ignore[no-any-return]
 
     def camera_to_come(self, renderer: Any) -> Any:
-        """Return the ``vtkCamera`` of a renderer's next picture."""
-        return camera_to_come(renderer)
+        """Return the camera of a renderer's next picture: its own, or what VTK will make."""
+        if renderer.IsActiveCameraCreated():
+            return renderer.GetActiveCamera()
+        return framed(vtkCamera(), renderer, renderer.ComputeVisiblePropBounds())
 
 
 refuse(VDIActorMethods, OF_ACTORS)

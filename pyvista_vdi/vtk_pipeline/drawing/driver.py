@@ -33,7 +33,7 @@ from pyvista_vdi.vtk_pipeline.drawing.screen import ImageTexture, NoDepth, place
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
-from pyvista_vdi.vtk_pipeline.interaction.timer import PERIOD, Timer
+from pyvista_vdi.vtk_pipeline.interaction.timer import Timer
 from pyvista_vdi.vtk_pipeline.interaction.window import Window, now
 
 #: Pictures as coarse as previews that tell what a volume's rays take, of which the fastest counts:
@@ -229,8 +229,7 @@ class Driver(Planner):
         """Start the event loop's timer, if something goes on and no hand moves."""
         window = self._window() if window is None else window
         if window is not None and self.goes_on and not window.moving:
-            period = PERIOD if self.input is None else self.input.period or PERIOD
-            self._timer.start(window.interactor, period)
+            self._timer.start(window.vtk_window().GetInteractor())
 
     def _tick(self) -> None:
         """Look, from the event loop, at what goes on, and have shown what is new."""
@@ -255,13 +254,9 @@ class Driver(Planner):
                 self._last = NOTHING
                 with suppress(VDIError):
                     self.box.place(None if self.input is None else self.input.bounds())
-            message = f"the VDI cannot be drawn: {type(error).__name__}: {error}"
-            if isinstance(error, KeyboardInterrupt):
-                message = (
-                    "generating the VDI was interrupted: what was shown stays; call "
-                    "actor.regenerate() to try again"
-                )
-            self.warn(message, error)
+            said = f"the VDI cannot be drawn: {type(error).__name__}: {error}"
+            again = isinstance(self.input, VDISource)
+            self.warn(f"{said}; actor.regenerate() tries again" if again else said, error)
             # Without the frames that it came from, which hold buffers
             self.trouble = error.with_traceback(None)
             error.__cause__ = error.__context__ = None

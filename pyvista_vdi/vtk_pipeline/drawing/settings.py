@@ -29,7 +29,6 @@ class MapperSettings:
     opacity_multiplier: float = 1.0
     transmittance_cutoff: float = TRANSMITTANCE_CUTOFF
     target_fps: float | None = None  # the window's desired update rate
-    adjust_multi_samples: bool = True
     image_distance: float = 1.0
     picking_opacity: float = DEFAULT_OPACITY
     adjust: bool = True
@@ -51,13 +50,6 @@ SETTINGS: Mapping[str, Option] = {
     "OpacityMultiplier": _DECLARED["opacity_multiplier"],
     "TransmittanceCutoff": _DECLARED["transmittance_cutoff"],
     "TargetFrameRate": _DECLARED["target_fps"],
-    "AutoAdjustMultiSamples": Option(
-        "adjust_multi_samples",
-        True,
-        "whether previews go without multisampling where that makes them late",
-        "All VDIs in a window must allow it; ``GetMultiSamples()`` stays as it was set.",
-        check=partial(as_flag, name="AutoAdjustMultiSamples"),
-    ),
     "ImageSampleDistance": Option(
         "image_distance",
         1.0,
