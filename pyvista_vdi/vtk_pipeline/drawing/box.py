@@ -72,8 +72,9 @@ class Box(Algorithm):
 
     def give_components(self, components: int) -> None:
         """Set the voxels' components: VTK asks for four where they are dependent."""
-        self.components = components
-        self._allocate()
+        if components != self.components:
+            self.components = components
+            self._allocate()
 
     def place(self, bounds: tuple[float, ...] | None) -> None:
         """Set the bounds, model frame; ``None``: none."""

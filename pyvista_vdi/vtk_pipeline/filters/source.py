@@ -51,14 +51,18 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     is_vdi_image,
     require_image,
     scalars_of,
-    vdi_from_image,
     vdi_to_image,
     volume_from_vtk,
 )
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 from pyvista_vdi.vtk_pipeline.filters.view import View, camera_of
-from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkAlgorithmOutput,
+    vtkDataObject,
+    vtkImageData,
+    vtkWeakReference,
+)
 
 #: What two equal sizes of pixels differ by at most.
 ROUNDING = 1e-6
@@ -498,14 +502,18 @@ for _told in GenerationOptions.declared.values():
 
 
 def input_of(data: Any) -> Input:
-    """Return what to draw for a VDI, an image of one, a VDISource, or what extensions show."""
-    if isinstance(data, VDI):
-        return Input(data)
+    """Return what to draw for a VDI, an image of one, a port, or what extensions show."""
+    if isinstance(data, vtkAlgorithmOutput):
+        producer = data.GetProducer()
+        if isinstance(producer, VDISource):
+            return producer
+        shown = Input(port=data)
+        shown.vdi()  # refuse what is no VDI now
+        return shown
     if isinstance(data, DeferredInput | VDISource):
         return data
-    if isinstance(data, DeferredVDI) or is_vdi_image(data):
-        # Of values this raises, and says what to do
-        return Input(as_vdi(data if isinstance(data, DeferredVDI) else vdi_from_image(data)))
+    if isinstance(data, VDI | DeferredVDI) or is_vdi_image(data):
+        return Input(as_vdi(data))  # of values this raises, and says what to do
     show = registry.shown(data)
     if show is not None:
         return show(data)  # type: ignore[no-any-return]
@@ -513,13 +521,3 @@ def input_of(data: Any) -> Input:
         f"a VDIMapper draws a VDI, its canonical image, a series, a set or a VDISource's output; "
         f"got {type(data).__name__}: put a VDISource between a volume and the mapper"
     )
-
-
-def input_of_port(port: Any) -> Input:
-    """Return what to draw for an output port."""
-    producer = port.GetProducer()
-    if isinstance(producer, VDISource):
-        return producer
-    shown = Input(port=port)
-    shown.vdi()  # refuse what is no VDI now
-    return shown

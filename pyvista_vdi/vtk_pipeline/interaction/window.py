@@ -190,17 +190,13 @@ class Window:
         window = self.vtk_window()
         return window is None or tuple(window.GetTileScale()) == (1, 1)
 
-    def takes_picture(self, renderer: Any) -> bool:
-        """Whether this frame is drawn to be kept: such a frame is always full.
+    @property
+    def keeps_picture(self) -> bool:
+        """Whether this frame is drawn to be kept, whatever its cameras are.
 
         A screenshot draws in tiles, or with a camera of its own; an export of vector graphics has
         a helper installed.
         """
-        return self._keeps_picture or not self.knows(renderer.GetActiveCamera())
-
-    @property
-    def _keeps_picture(self) -> bool:
-        """Whether this frame is drawn to be kept, whatever its cameras are."""
         exported = vtkOpenGLGL2PSHelper.GetInstance() is not None
         return self._picture_wanted or not self.whole_picture or exported
 
@@ -245,7 +241,7 @@ class Window:
         cameras = [known() for known in self._known]
         return bool(shown) and all(
             self.previews(settings)
-            and not self._keeps_picture
+            and not self.keeps_picture
             and renderer.GetActiveCamera() in cameras
             for settings, renderer in shown
         )
