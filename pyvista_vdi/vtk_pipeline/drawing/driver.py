@@ -388,7 +388,6 @@ class Driver:
             self._complain(trouble)
         self._stamp = stamp
         vdi, made_of = source.last(), source.made_of
-        known = vdi is not None and made_of is not None
         content, volume, late, each = None, "whole", False, self.costs.volume
         if wanted is not None:
             content = wanted.content
@@ -413,7 +412,7 @@ class Driver:
             one_view=one_view,
             joint=joint,
             first_look=first,
-            made=self._as_made(vdi, frame, made_of) if known else None,  # type: ignore[arg-type]
+            made=None if vdi is None else self._as_made(vdi, frame, made_of),
             volume=volume,  # type: ignore[arg-type]
             late=late,
             seconds=1 / (window.pace.headroom * window.rate(settings)) if previews else None,
@@ -465,9 +464,8 @@ class Driver:
 
     def _estimate(self, source: VDISource, view: View) -> None:
         """Estimate, in the background, the error of the VDI in a view."""
-        vdi, of, mapper = source.last(), source.made_of, self.actor().GetMapper()
-        assert vdi is not None and of is not None  # noqa: PT018
-        request, made = of, vdi
+        made, request, mapper = source.last(), source.made_of, self.actor().GetMapper()
+        assert made is not None and request is not None  # noqa: PT018
         planes = np.reshape(planes_of(mapper), (-1, 6))
         options = RenderOptions(planes, mapper, self.settings.opacity_multiplier)
 

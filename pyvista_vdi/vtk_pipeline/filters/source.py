@@ -18,7 +18,6 @@ from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
     InvalidVolumeError,
-    warn_external,
 )
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
@@ -75,7 +74,6 @@ class Request(GenerationRequest):
     screen: View = None  # type: ignore[assignment]  # what a frame shows it in, before coverage
     target: QualityTarget | None = None
     content: Any = field(default=None, repr=False)  # equal where only the view is another
-    covered: bool = True  # as far as coverage asks
 
     @property
     def key(self) -> Any:
@@ -132,7 +130,7 @@ class VDISource(SceneAlgorithm, Input):
         "coverage",
         "what the VDI covers: its window, ``'view'``, or ``'bounds'``, the smallest rectangle of "
         "the screen's pixel grid that contains the whole volume (where the eye is inside its "
-        "bounds, or they reach behind it, a ``VDIWarning`` is given and the window is used)",
+        "bounds, or they reach behind it, the window)",
         "view",
         partial(one_of, name="coverage", names=("bounds", "view")),
     )
@@ -233,12 +231,6 @@ class VDISource(SceneAlgorithm, Input):
     def MakeVDI(self, request: Request) -> VDI:
         """Return the VDI of a request, made now; what the source has made stays."""
         self.SetAbortExecute(0)  # of this VDI nobody has said it yet
-        if not request.covered:
-            warn_external(
-                "coverage='bounds' needs the eye outside the volume, with all of it in front: the "
-                "VDI covers the current view only (coverage='view'); move the camera back and "
-                "regenerate for the whole volume"
-            )
         asked = request.replace(progress=self._advance)
         if request.target is None:
             return generate_vdi(asked)
@@ -448,19 +440,18 @@ class VDISource(SceneAlgorithm, Input):
         options = replace(self.GetOptions(), lights=lights)
         # Where lights of the scene shine on it, the volume is lit where it stands now
         placed = self.placed if lights.of_scene else None
-        generating, covered = (camera, window_size), True
+        generating = (camera, window_size)
         if placed is not None:
             generating = (camera.replace(model_transform=placed), window_size)
         if self.GetCoverage() == "bounds":
             # The corners of the box of points, model frame: tighter than bounds if rotated
             box = bounds_corners([end for n in volume.dimensions for end in (0, n - 1)])
             corners = np.column_stack([box, np.ones(8)]) @ volume.index_to_model.T[:, :3]
-            wide = covering_view(*generating, corners)
-            covered, generating = wide is not None, wide or generating
+            generating = covering_view(*generating, corners) or generating
         device, metadata = self.GetDevice(), {"scalars": volume.name, **self.GetMetadata()}
         content = (self._volume_key, table, options, placed, target, device, metadata)
         settings = (options, device, None, metadata, View(camera, window_size), target)
-        request = Request(volume, table, camera, window_size, *settings, content, covered)
+        request = Request(volume, table, camera, window_size, *settings, content)
         return request.seen_from(*generating)
 
     def _read(self, image: Any) -> Volume:
