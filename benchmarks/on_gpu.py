@@ -95,6 +95,7 @@ def plotter(options: argparse.Namespace) -> Iterator[tuple[Any, ...]]:
             plot.add_vdi(image, cmap="bone", draw="vdi", device=options.device)
         if what == "no headlight":
             plot.remove_all_lights()
+            plot.add_light(pv.Light(position=(1, 2, 3), light_type="scene light"))
         if what == "opaque mesh":
             plot.add_mesh(pv.Sphere(radius=image.length / 8, center=image.center))
         plot.show(auto_close=False)

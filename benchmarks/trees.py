@@ -90,7 +90,8 @@ def importable(tree: Path, folder: Path) -> dict[str, Any]:
     for path in (*(tree / "pyvista_vdi").resolve().iterdir(), (tree / "opencl").resolve()):
         if not (package / path.name).exists():
             (package / path.name).symlink_to(path)
-    return {"cwd": folder, "env": {**os.environ, "PYTHONPATH": str(folder)}, "text": True}
+    first = os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])
+    return {"cwd": folder, "env": {**os.environ, "PYTHONPATH": first}, "text": True}
 
 
 def switched(tree: Path, folder: Path, old: str, new: str) -> Path:

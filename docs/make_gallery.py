@@ -25,7 +25,7 @@ LARGEST_FILE = 100 * 1024
 #: Those of the scripts of docs/gallery, which are JPEG.
 LARGEST_PHOTO = 150 * 1024
 
-COMPARISON = ("brain", "steep", "320x180")
+COMPARISON = ("brain", "--cmap viridis --opacity sigmoid_10", "320x180")
 
 
 def main(names: list[str]) -> None:
@@ -42,9 +42,9 @@ def main(names: list[str]) -> None:
         if names:
             return
         volume, look, size = COMPARISON
-        options = ("--example", volume, "--tf", look, "--size", size, "--repeats", "1")
+        options = ("--example", volume, *look.split(), "--size", size, "--repeats", "1")
         run(environment, "-m", "pyvista_vdi", "compare", *options, "--out", name)
-        keep(folder / f"{volume}-{look}.png", TARGET / "compare.png", SHEET_WIDTH)
+        keep(folder / f"{volume}.png", TARGET / "compare.png", SHEET_WIDTH)
 
 
 def run(environment: dict[str, str], *arguments: str, folder: Path | None = None) -> None:

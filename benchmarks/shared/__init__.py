@@ -168,9 +168,9 @@ def execute(
     plan = {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items() if k != "out"}
     results = Results(path, kind, plan, rooms, "whole" if options.whole else "sample")
     refused = []
-    from tqdm import tqdm  # which a machine that is lent for minutes may lack
-
-    for case in tqdm(chosen, disable=not sys.stderr.isatty()):
+    for number, case in enumerate(chosen, 1):
+        if sys.stderr.isatty():
+            print(f"{number} of {len(chosen)}: {case.name}", file=sys.stderr)
         try:
             results.add(case, measure(case))
         except (VDIError, MemoryError) as error:

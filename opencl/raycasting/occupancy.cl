@@ -53,13 +53,37 @@ __kernel void count_packed(__global const ulong *starts,
     }
 }
 
-// The first front and the last back of each list that is not empty: one work-item per list.
-__kernel void ends_of_lists(__global const ulong *starts, __global const float *fronts,
-                            __global const float *backs, uint lists, __global float2 *ends)
+// How many entries each bundle of lists takes, the longest list's length, and the first front and
+// the last back of each list that is not empty. One work-item per bundle.
+__kernel void measure_bundles(__global const ulong *starts, __global const float *fronts,
+                              __global const float *backs, int width, int height,
+                              __global uint *lengths, __global uint *longest, __global float2 *ends)
 {
-    const size_t list = get_global_id(0);
-    if (list < lists && starts[list] < starts[list + 1])
-        ends[list] = (float2)(fronts[starts[list]], backs[starts[list + 1] - 1]);
+    const int wide = (width + BUNDLE - 1) / BUNDLE, bundle = (int)get_global_id(0);
+    uint most = 0;
+    for (int n = 0; n < BUNDLE * BUNDLE; ++n) {
+        const int i = bundle % wide * BUNDLE + n % BUNDLE, j = bundle / wide * BUNDLE + n / BUNDLE;
+        if (i >= width || j >= height)
+            continue;
+        const size_t list = (size_t)j * (size_t)width + (size_t)i;
+        const ulong first = starts[list], end = starts[list + 1];
+        if (first < end)
+            ends[list] = (float2)(fronts[first], backs[end - 1]);
+        most = max(most, (uint)(end - first));
+    }
+    if (bundle / wide * BUNDLE < height)
+        lengths[bundle] = most * BUNDLE * BUNDLE;
+    if (most > *longest)
+        atomic_max(longest, most);
+}
+
+// Headers of bundles (raycasting/supersegments.cl).
+__kernel void bundle_headers(__global const ulong *begins, uint bundles, __global ulong *headers)
+{
+    const size_t bundle = get_global_id(0);
+    if (bundle < bundles)
+        headers[bundle] = begins[bundle] | (begins[bundle + 1] - begins[bundle]) / (BUNDLE * BUNDLE)
+                                               << FIRST_BITS;
 }
 
 // One work-item per stack: its changes become counts.

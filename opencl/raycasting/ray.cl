@@ -4,7 +4,6 @@
 // r runs along a ray over an interval of length 1 and is 0 at the end that is deeper in V_O, where
 // the interpolated 1/Z is smallest and its rounding matters most.
 //
-// -D CROPPED=0, 1           only parts of it are drawn, see lib/cropping.cl
 // -D DOUBLE_FLOAT_RAYS=2    r is 0 at the other end, `deep` is that one and Z_deep is its depth:
 // the
 //                           lists lie near it. LANES is 1
@@ -24,8 +23,13 @@ typedef struct {
     Real w_deep, w_along; // of sixteen rays, 1 / Z is w_deep + r w_along: fewer operations
     Real t_begin, t_deep; // t where it begins, and where r is 0
     Real t_scale;         // t per unit of r, but for the division by w(r) in perspective
-    Kept kept;            // parts of it, in r
+    uint regions;         // of cropping that are kept, see lib/cropping.cl; 0: all
+    Kept kept;            // parts of it, in r, if CROPPED
 } ListRay;
+
+#ifndef CROPPED // whether only parts of `ray` are drawn; 0 where none ever is
+#define CROPPED (ray->regions != 0)
+#endif
 
 // t on a ray; where it begins and ends; a form, and (u, v, depth coordinate), there.
 #ifdef DOUBLE_FLOAT_RAYS
@@ -128,6 +132,7 @@ inline Kept kept_parts_of_ray(__global const float *forms, int planes, Real a, R
 inline void begin_ray(ListRay *ray, __global const float *forms, const Frame *frame, Real a, Real b,
                       Real t_end, Int wanted)
 {
+    ray->regions = frame->regions;
     // Clip them to the bounds, to V_O's viewport and to planes
     Time t0, t1;
     Real t_length;

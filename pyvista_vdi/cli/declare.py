@@ -23,7 +23,6 @@ from pyvista_vdi.model.options import (
     RenderOptions,
     declared,
 )
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 
 
 def _numbers_as(
@@ -115,7 +114,6 @@ parallel_scale      LENGTH    half the viewport's height; makes the projection p
 camera_json         FILE      Camera.to_dict() as JSON
 azimuth=0           DEGREES   turn by
 elevation=0         DEGREES   lift by
-tf                  {tf}      a standard transfer function; --cmap and --opacity change its parts
 transfer_function   FILE      TransferFunction.to_dict() as JSON; needs no PyVista
 memory_limit        N         bytes of the device; what does not fit goes there in bricks
 criterion           NAME      where a list is cut: least-error (default) or homogeneity
@@ -130,17 +128,17 @@ json                -         print JSON
 out=.               FOLDER    where the files go
 angles              A,B,...   degrees from the generating view
 no_vtk              -         leave out VTK's mappers
-""".replace("{tf}", f"{{{','.join(TRANSFER_FUNCTIONS)}}}")
+"""
 
 #: Options that stand together in help, after their title and what is said of them.
 _GROUPS = {
     "camera": """[camera] By default {}.
         position focal_point view_up view_angle parallel_scale camera_json azimuth elevation""",
     "look": """[classification] Names, defaults and meaning are those of PyVista's add_volume.
-        tf cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale shade
+        cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale shade
         scalars preference interpolation ambient diffuse specular specular_power""",
     "values": """[classification] Of VDIs that store scalars.
-        tf cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale
+        cmap opacity clim n_colors opacity_unit_distance flip_scalars log_scale
         transfer_function""",
     "deferral": """[classified afterwards] Scalars are stored; render, view, convert take looks.
         classification value_range""",

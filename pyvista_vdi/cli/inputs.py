@@ -20,7 +20,6 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Look
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import declared
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 
@@ -31,7 +30,7 @@ OF_VOLUMES = (
     *("scalars", "preference", "spacing", "origin", "level", "channel", "time_index", "series"),
 )
 #: Options that give colours and opacities.
-LOOK = ("tf", "transfer_function", *declared(Look))
+LOOK = ("transfer_function", *declared(Look))
 #: Options that say where the eye is, instead of turning the default view.
 PLACE = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")
 
@@ -49,7 +48,7 @@ def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dic
 
 def classification(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments that say how the volume looks; which array it is, the volume says."""
-    found = {**(TRANSFER_FUNCTIONS[options.tf] if options.tf else {}), **given(options, Look)}
+    found = given(options, Look)
     path = getattr(options, "transfer_function", None)
     if path is not None:
         function = from_json(path, TransferFunction.from_dict, "transfer function")
@@ -194,7 +193,7 @@ def look_for(
     look = classification(options)
     if colors and not look:
         raise UnsupportedError(
-            f"{named} stores scalars, which have no colours yet: give --cmap, --opacity, --tf or "
+            f"{named} stores scalars, which have no colours yet: give --cmap, --opacity or "
             "--transfer-function"
         )
     return look

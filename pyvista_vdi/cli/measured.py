@@ -27,12 +27,9 @@ from pyvista_vdi.plotting.progress import DelayedBar
 
 def compare(options: argparse.Namespace) -> int:
     """Compare a volume's pictures, and write a table, a picture, a JSON file and the VDI."""
-    if options.tf is None and options.cmap is None and options.opacity is None:
-        options.tf = "soft"
     look = classification(options)
     Classification.composited(look, "compare")  # refused before anything is read or written
-    stem = f"{volume_name(options)}-{options.tf or 'custom'}"
-    volume = read_volume(options)
+    stem, volume = volume_name(options), read_volume(options)
     names = ("angles", "max_supersegments", "precision", "sample_distance", "repeats", "device")
     how = {n: getattr(options, n) for n in names if getattr(options, n) is not None}
     bar = DelayedBar(label="comparing")

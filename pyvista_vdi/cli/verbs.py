@@ -99,7 +99,7 @@ VERBS = (
         "compare",
         "measured",
         "compare VTK's mappers, our raycaster and a VDI by pictures",
-        " --example brain --tf soft --out out",
+        " --example brain --cmap bone --out out",
     ),
     _verb(
         "tradeoff",

@@ -142,25 +142,21 @@ def _probe(info: DeviceInfo) -> tuple[DeviceInfo, Runtime | None]:
 def run_probe(runtime: Runtime) -> str:
     """Run the probe kernel and return what is wrong with its numbers, if anything."""
     x = np.linspace(0.01, 0.99, PROBE_COUNT, dtype=np.float32)
-    groups = PROBE_COUNT // PROBE_GROUP
     with (
         runtime.upload(x, name="probe input") as inputs,
         runtime.buffer((PROBE_COUNT, 4), np.float32, name="probe values") as values,
-        runtime.buffer((groups,), np.uint32, name="probe sums") as sums,
         runtime.buffer((1,), np.uint32, name="probe total") as total,
     ):
         runtime.fill(total, 0)
-        launch = runtime.bind(
-            "lib/probe.cl", "probe", x=inputs, values=values, group_sum=sums, total=total
-        )
+        launch = runtime.bind("lib/probe.cl", "probe", x=inputs, values=values, total=total)
         launch(PROBE_COUNT, PROBE_GROUP, shared=PROBE_GROUP)
-        computed, group_sums, whole = (runtime.download(b) for b in (values, sums, total))
+        computed, whole = runtime.download(values), runtime.download(total)
     exact = x.astype(np.float64)
     fused = exact * exact - (x * x)  # exact in float64: 48 bits
     expected = np.stack([np.expm1(-exact), np.log1p(-exact), np.exp(-exact), fused], axis=1)
-    right = (
-        np.allclose(computed, expected, rtol=PROBE_RTOL, atol=0)
-        and np.array_equal(group_sums, np.arange(len(x)).reshape(groups, -1).sum(1))
-        and whole[0] == len(x) * (len(x) + 1) // 2
+    right = np.allclose(computed, expected, rtol=PROBE_RTOL, atol=0)
+    return (
+        ""
+        if right and whole[0] == len(x) * (len(x) + 1) // 2
+        else "the probe kernel computes wrong numbers"
     )
-    return "" if right else "the probe kernel computes wrong numbers"

@@ -28,6 +28,8 @@ _WIDENED = {"bool": "uint8", "float16": "float32", "int64": "float64", "uint64":
 
 #: Attributes by which arrays in files say that their values are others than those that are stored.
 _PACKING = ("scale_factor", "add_offset", "_Unsigned")
+#: Attributes with a number that stands for nothing, and NaN as zarr, HDF5 and xarray write it.
+_MISSING, _NAN = ("_FillValue", "missing_value"), ("nan", "[nan]", "AAAAAAAA+H8=")
 
 
 class ChunkedArray:
@@ -50,7 +52,10 @@ class ChunkedArray:
         *,
         index: Sequence[int | slice] | None = None,
     ) -> None:
-        if said := [name for name in _PACKING if name in getattr(source, "attrs", {})]:
+        told = getattr(source, "attrs", {})
+        said = [name for name in _PACKING if name in told]
+        said += [name for name in _MISSING if name in told and str(told[name]) not in _NAN]
+        if said:
             raise InvalidVolumeError(
                 f"the array's values are packed ({', '.join(said)}): open it by xarray, which "
                 'unpacks them, and give pyvista_vdi.Volume(dataset["name"].data)'

@@ -1,7 +1,6 @@
 """The standard cases: transfer functions and views that give a measured figure the same meaning.
 
-They are those of the design's section 7. Everything that measures (``pyvista-vdi compare``,
-tests, benchmarks) takes them from here.
+They are those of the design's section 7. Tests and benchmarks take them from here.
 """
 
 import math

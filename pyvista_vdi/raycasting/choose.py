@@ -57,12 +57,11 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     lists = prepared.switches  # OFFSET_T, DEPTH, PACKED; DOUBLE_FLOAT_RAYS where it is needed
     compensated = summation(options.preview_samples or prepared.most_media)
     sums: dict[str, int | str] = {"COMPENSATED": compensated}
-    walk: dict[str, int | str] = {"CROPPED": int(bool(scene.cropped.forms))}
-    double_float, cropped = prepared.double_float, walk["CROPPED"]
+    double_float, cropped = prepared.double_float, bool(scene.cropped.forms)
     suit_blocks = not double_float and not prepared.long_offsets
 
     if options.preview_samples is not None:
-        switches = {**lists, **sums, "CROPPED": cropped}
+        switches = {**lists, **sums}
         counts = {"counts": prepared.occupancy.counts, "samples": options.preview_samples}
         items = block_items(*scene.size)
         return ChosenKernel(
@@ -72,7 +71,7 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     # What rays cross of one of several VDIs
     if scene.segments:
         lanes = LANES if device.is_cpu and suit_blocks else 1
-        switches = {**lists, **walk, "LANES": lanes}
+        switches = {**lists, "LANES": lanes}
         return ChosenKernel(
             ("multi_vdi/segments.cl", "segments"), switches, 0, GROUP // lanes, {}, lanes
         )
@@ -89,7 +88,7 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     if scene.hit is not None:
         return by_columns(
             ("raycasting/first_hits.cl", "first_hits"),
-            {**lists, **walk},
+            lists,
             least_optical_depth=scene.hit.optical_depth,
             accumulated=int(scene.hit.accumulated),
         )
@@ -106,7 +105,7 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     # Each ray is still in one list: the kernel for single rays has a loop along it. Cropped rays
     # are followed in blocks where they can be
     if scene.one_list and not (cropped and in_blocks):
-        return by_columns(_RAYCAST, {**lists, **walk, **sums, "LANES": 1})
+        return by_columns(_RAYCAST, {**lists, **sums, "LANES": 1})
 
     # Rays that have many lists in common
     packets = scene.packets if uncropped else None
@@ -123,7 +122,7 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
             LANES,
         )
     lanes = LANES if in_blocks else 1
-    switches = {**lists, **walk, **sums, "LANES": lanes}
+    switches = {**lists, **sums, "LANES": lanes}
     return by_columns(_RAYCAST, switches, lanes)
 
 

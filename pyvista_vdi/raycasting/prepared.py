@@ -4,15 +4,15 @@ import contextlib
 import copy
 import threading
 import weakref
-from collections.abc import Callable, Iterable
-from functools import partial, reduce
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together, padded
-from pyvista_vdi.device.constants import BUNDLE, FIRST_BITS, GROUP, LIST_HEADER, SLABS, STACK
+from pyvista_vdi.device.constants import BUNDLE, GROUP, LIST_HEADER, LISTS_PER_ITEM, SLABS, STACK
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classify_values import CELLS, ValuesLook
@@ -215,30 +215,13 @@ class PreparedVDI:
         closest = min(near, self.depth_origin)
         #: Whether the depth coordinate is that of a long lens.
         self.shifted = not self.parallel and 0 < far <= _LONG_LENS * closest
-        counts = vdi.counts
-        #: About how many supersegments a ray may meet: it crosses a border from list to list.
-        self.most_media = sum(vdi.window_size) + int(counts.max(initial=0))
         #: Whether supersegments have 8 bytes.
         self.packed = vdi.packing is not None
-        # Find where lists begin, by their bundles or, of 8-byte supersegments, each
-        lengths = counts + LIST_HEADER * (counts > 0)
-        if not self.packed:
-            lengths = _longest(counts) * BUNDLE**2
-        begins = np.zeros(lengths.size + 1, np.int64)
-        np.cumsum(lengths, out=begins[1:])
-        self._entries = int(begins[-1])
-        #: Whether offsets take 64 bits: kernels count words of 8 bytes, of which an entry takes up
-        #: to two, by signed numbers.
-        self.long_offsets = 2 * self._entries >= 2**31
-        headers: NDArray[Any] = begins.astype(np.int64 if self.long_offsets else np.int32)
-        if not self.packed:
-            longest = lengths.reshape(-1) // BUNDLE**2
-            headers = (begins[:-1] | longest << FIRST_BITS).view(np.uint64)
         centre = rays.pixel_rays(vdi.camera, vdi.window_size, vdi.bounds).direction
         with kept_together() as keep:
-            self.headers = keep(runtime.upload(headers, "list headers"))
             #: Direction of a centre ray per unit of view depth, model frame.
-            self._centre = keep(runtime.upload(centre.astype(np.float32), "centre rays"))
+            centres = runtime.upload(centre.astype(np.float32), "centre rays", brief=True)
+            self._centre = keep(centres)
             self._prepare(vdi, keep)
 
     @property
@@ -277,6 +260,12 @@ class PreparedVDI:
                 for name in ("origins", "strides", "words"):
                     held[name] = upload(getattr(packing, name), f"{name} of 8-byte supersegments")
                 held |= {"starts": upload(vdi.offsets, "list offsets"), "step": packing.step}
+                # Each list has a header, and words before its supersegments
+                lengths = np.where(vdi.counts > 0, vdi.counts + LIST_HEADER, 0)
+                begins = np.concatenate([[0], np.cumsum(lengths)])
+                self._tell_sizes(int(begins[-1]), int(vdi.counts.max(initial=0)))
+                headers = begins.astype(np.int64 if self.long_offsets else np.int32)
+                self.headers = keep(runtime.upload(headers, "list headers"))
                 occupied = np.flatnonzero(vdi.counts)
                 first = packing.codes(offsets[occupied]).front
                 last = packing.codes(offsets[occupied + 1] - 1).back
@@ -288,14 +277,13 @@ class PreparedVDI:
                 if not held:
                     arrays: Any = zip(_ARRAYS.items(), vdi.arrays, strict=True)
                     held = {name: upload(array, what) for (name, what), array in arrays}
-                ends = self._ends(vdi, held)
+                ends = self._place_bundles(held, keep)
             self._tell_double_float(ends)
 
             if packing is None:
                 self._prepare_lists(held, self.headers, keep)
             else:
                 self._prepare_packed(held, keep)
-            runtime.finish()  # the buffers above may be host memory in use
         if runtime.is_cpu:
             self.lit = share_lit(vdi, *self.depths)
 
@@ -359,16 +347,51 @@ class PreparedVDI:
         self.occupancy = OccupancyGrid(self, count)
         keep(self.occupancy.counts), keep(self.occupancy.masks)
 
-    def _ends(self, vdi: VDI, held: dict[str, Any]) -> NDArray[np.float32]:
-        """Return the first front and the last back of the lists that are not empty, (n, 2)."""
-        lists = self.window[0] * self.window[1]
-        with self.runtime.result((lists, 2), name="ends of lists") as ends:
-            counted = {name: held[name] for name in _COUNTED}
-            gather = self.runtime.bind(
-                "raycasting/occupancy.cl", "ends_of_lists", **counted, lists=lists, ends=ends
-            )
-            gather(padded(lists, GROUP), GROUP)
-            return self.runtime.download(ends)[vdi.counts.ravel() > 0]
+    def _place_bundles(
+        self, held: Mapping[str, Any], keep: Callable[[DeviceBuffer], DeviceBuffer]
+    ) -> NDArray[np.float32]:
+        """Find where bundles begin, on the device; nothing is uploaded.
+
+        Returns the first front and the last back of the lists that are not empty, (n, 2).
+        """
+        runtime, (width, height) = self.runtime, self.window
+        bundles = -(-width // BUNDLE) * -(-height // BUNDLE)
+        blocks = -(-bundles // (GROUP * LISTS_PER_ITEM))
+        with (
+            runtime.buffer((bundles,), np.uint32, "lengths of bundles") as lengths,
+            runtime.buffer((1,), np.uint32, "longest list") as longest,
+            runtime.buffer((blocks,), np.uint64, "sums of lengths") as sums,
+            runtime.buffer((bundles + 1,), np.uint64, "where bundles begin") as begins,
+            runtime.result((width * height, 2), name="ends of lists") as ends,
+        ):
+            for buffer, value in ((longest, 0), (begins, 0), (ends, np.nan)):
+                runtime.fill(buffer, value)
+            occupancy, offsets = "raycasting/occupancy.cl", "generation/offsets.cl"
+            items, group = padded(bundles, GROUP), GROUP
+            of_lists = {name: held[name] for name in _COUNTED} | {"width": width, "height": height}
+            measure = runtime.bind(occupancy, "measure_bundles", **of_lists, lengths=lengths)
+            measure(items, group, longest=longest, ends=ends)
+            add = {"lists": bundles, "lengths": lengths, "partial": GROUP, "sums": sums}
+            runtime.bind(offsets, "sum_lengths", **add)(blocks * GROUP, group)
+            place = runtime.bind(offsets, "list_offsets", **add, made=0, all_offsets=begins)
+            place(blocks * GROUP, group)
+            self.headers = keep(runtime.result((bundles,), np.uint64, "list headers"))
+            write = runtime.bind(occupancy, "bundle_headers", begins=begins, bundles=bundles)
+            write(items, group, headers=self.headers)
+            entries = np.zeros(1, np.uint64)
+            runtime.download_later(begins, entries, first=bundles)()
+            self._tell_sizes(int(entries[0]), int(runtime.download(longest)[0]))
+            found = runtime.download(ends)
+            return found[~np.isnan(found[:, 0])]
+
+    def _tell_sizes(self, entries: int, longest: int) -> None:
+        """Set what follows from the entries of all lists, and the length of the longest."""
+        self._entries = entries
+        #: Whether offsets take 64 bits: kernels count words of 8 bytes, of which an entry takes up
+        #: to two, by signed numbers.
+        self.long_offsets = 2 * entries >= 2**31
+        #: About how many supersegments a ray may meet: it crosses a border from list to list.
+        self.most_media = sum(self.window) + longest
 
     def _tell_double_float(self, ends: NDArray[np.float32]) -> None:
         """Set what follows from how thin lists are for where they lie in the bounds' depths."""
@@ -415,7 +438,7 @@ class KeptValues(PreparedVDI):
             name: keep(self.runtime.upload(array, _ARRAYS[name]))
             for name, array in zip(_COUNTED, arrays, strict=False)
         }
-        self._tell_double_float(self._ends(vdi, self._faces))
+        self._tell_double_float(self._place_bundles(self._faces, keep))
 
     def shown(self, look: ValuesLook) -> PreparedVDI:
         """Return what a transfer function shows: what is transparent is left out."""
@@ -493,11 +516,3 @@ def release_from_devices(things: Iterable[VDI | DeferredVDI | Volume | None]) ->
             late: Any = thing.late
             if hasattr(late, "on"):
                 late.arrays()
-
-
-def _longest(counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the length of the longest list of each bundle; ``counts`` are (height, width)."""
-    height, width = counts.shape
-    longest = np.pad(counts, ((0, -height % BUNDLE), (0, -width % BUNDLE)))
-    longest = reduce(np.maximum, (longest[n::BUNDLE] for n in range(BUNDLE)))
-    return reduce(np.maximum, (longest[:, n::BUNDLE] for n in range(BUNDLE)))

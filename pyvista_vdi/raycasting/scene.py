@@ -128,12 +128,15 @@ class Scene:
         # times m absorbs as m times the extinction
         direction = rays.direction_forms(pixel_rays, size, options.opacity_multiplier)
         cropped = rays.cropped(pixel_rays, options.cropping, prepared.bounds)
-        planes = [
-            *rays.box_planes(pixel_rays, prepared.bounds),
-            *_viewport_planes(prepared, coordinates),
-            *rays.view_planes(camera, pixel_rays, options.clipping_planes),
-            *cropped.planes,
-        ]
+        # Keep what is in the bounds, in V_O's viewport and in front of its eye, and in the view
+        u, v, _, denominator = coordinates
+        wide, high = (edge / 2 * denominator for edge in prepared.window)
+        planes = rays.box_planes(pixel_rays, prepared.bounds)
+        planes += [wide + u, wide - u, high + v, high - v]
+        if not prepared.parallel:
+            planes.append(denominator - prepared.nearest * np.eye(6)[0])
+        planes += rays.view_planes(camera, pixel_rays, options.clipping_planes)
+        planes += cropped.planes
         forms = [*coordinates, *direction, *planes, *cropped.forms]
         return cls(
             prepared,
@@ -235,17 +238,3 @@ class Scene:
                 "one_list": self.one_list,
             },
         }
-
-
-def _viewport_planes(
-    prepared: PreparedVDI, coordinates: list[NDArray[np.float64]]
-) -> list[NDArray[np.float64]]:
-    """Return forms that keep what is in V_O's viewport and in front of its eye."""
-    u, v, _, denominator = coordinates
-    wide, high = (edge / 2 * denominator for edge in prepared.window)
-    forms = [wide + u, wide - u, high + v, high - v]
-    if not prepared.parallel:
-        front = denominator.copy()
-        front[0] -= prepared.nearest
-        forms.append(front)
-    return forms

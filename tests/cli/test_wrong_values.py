@@ -57,7 +57,7 @@ ALIKE = {
     NO_WHOLE: "compression-level port time-index level",
     NO_XYZ: "focal-point origin position spacing view-up",
     NO_CHOICE: "classification compression draw interpolation precision preference quality "
-    "regenerate scalars tf",
+    "regenerate scalars",
     NO_JSON: "camera-json transfer-function",
     ("nothing", "''", "nan"): "cmap criterion example",
     ("x 1", "0 nan", "2 1"): "clim value-range",

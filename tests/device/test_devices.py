@@ -79,16 +79,14 @@ def test_every_form_of_device_gives_the_same_runtime(runtime):
     assert runtime.info.full_name in str(caught.value)
 
 
-@pytest.mark.parametrize("where", ["", "probe values", "probe sums", "probe total"])
+@pytest.mark.parametrize("where", ["", "probe values", "probe total"])
 def test_probe_notices_wrong_numbers(runtime, monkeypatch, where):
     download = type(runtime).download
 
     def wrong(self, buffer):
         values = download(self, buffer)
-        if buffer.name == where == "probe values":
-            values[7, 3] *= 1.00001
-        elif buffer.name == where:
-            values[0] += 1
+        if buffer.name == where:
+            values[:1] += 1
         return values
 
     # Of the class: taken back on the runtime, a method would stay there as an attribute

@@ -110,7 +110,7 @@ def test_a_device_that_is_lost_while_it_is_waited_for(runtime, driver, operation
     expected = operation(runtime)
     before = state_of(runtime)
     driver.fail(WAITS, "each", "DEVICE_NOT_AVAILABLE")
-    with pytest.raises(DeviceError, match=f"while (waiting|reading).*{LOST}"):
+    with pytest.raises(DeviceError, match=f"while (waiting|reading|writing).*{LOST}"):
         operation(runtime)
     driver.work()
     assert state_of(runtime) == before

@@ -386,7 +386,7 @@ _VERBS: dict[str, tuple[tuple[Any, ...], str]] = {
             "--max-supersegments --tolerance --view-cone --clim --opacity --cmap --level --channel "
             "--time-index --compression-level --compression --position --focal-point --view-up "
             "--azimuth --elevation --view-angle --parallel-scale --camera-json --n-colors "
-            "--transfer-function --sample-distance --scalars --preference --tf --device "
+            "--transfer-function --sample-distance --scalars --preference --device "
             "--opacity-unit-distance --log-scale --flip-scalars --memory-limit"
         ),
     ),

@@ -80,7 +80,8 @@ def test_pictures_are_those_of_vtk(name, default_runtime):
     from pyvista_vdi.measure.vtk_mappers import VTKMapper
 
     case = CASES[name]
-    volume = examples.load_brain(as_volume=True)
+    brain = examples.load_brain(as_volume=True)
+    volume = Volume(brain.array.astype(np.float32), brain.spacing, brain.origin, brain.direction)
     if case.get("rgba"):
         volume = coloured(volume)
     prop = the_property(volume, case)

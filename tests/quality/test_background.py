@@ -127,7 +127,7 @@ assert background.running
 
 def test_a_volume_that_both_threads_need_first(runtime, background, monkeypatch):
     """One uploads it, and neither waits for the other's frame or turn for ever."""
-    for limit in ("FIRST_TURN", "SHORTEST_TURN", "SHARE"):
+    for limit in ("SHORTEST_TURN", "SHARE"):
         monkeypatch.setattr(turns, limit, 1e-9)  # a turn is over within any piece of work
     scene = Volume(np.random.default_rng(0).random((100, 100, 100)))
     seen = Camera((50, 50, 300), (50, 50, 50), (0, 1, 0)), WINDOW

@@ -16,7 +16,7 @@ from pyvista_vdi.raycasting.prepared import prepared_vdi
 #: The driver's functions that the runtime calls, by what they are for.
 ALLOCATIONS = ("Buffer",)
 LAUNCHES = ("enqueue_nd_range_kernel", "enqueue_copy", "enqueue_fill_buffer")
-WAITS = ("finish", "enqueue_map_buffer")
+WAITS = ("finish", "enqueue_map_buffer", "enqueue_copy")
 
 WINDOW = (24, 17)
 CAMERA = Camera((3.5, 3.5, 30), (3.5, 3.5, 3.5), (0, 1, 0))

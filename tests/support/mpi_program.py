@@ -34,7 +34,7 @@ def own_block(volume, rank):
 
 def same(folder):
     """Write the VDI of four blocks, with gradients, which need others' points."""
-    volume = volume_of("uint8")
+    volume = volume_of("float32")
     function = transfer_for(volume, "linear", gradient_opacities=[0.2, 1], gradient_range=(0, 30))
     options = {"max_supersegments": 8, "precision": "exact"}
     options |= {"transfer_function": function, "comm": COMM}

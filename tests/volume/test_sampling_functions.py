@@ -18,11 +18,11 @@ KINDS = [("int8", "uint"), ("uint16", "ulong"), ("float32", "uint")]
 def sampled(call, array, positions, nearest=False, index="uint"):
     positions = np.asarray(positions, np.float32)
     size = np.array([*array.shape[::-1], 0], np.int32)
-    defines = Variant(TYPES[array.dtype.name], index, nearest=nearest).defines
+    defines = Variant(TYPES[array.dtype.name], index).defines
     n = len(positions)
     return call(
-        FILE, "samples", n, np.ascontiguousarray(array), size, positions, call.empty(n),
-        by_value=(1,), **defines,
+        FILE, "samples", n, np.ascontiguousarray(array), size, positions, int(nearest),
+        call.empty(n), by_value=(1,), **defines,
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Matrix, tiled, viewpor
 from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Drawn, raycast
 from pyvista_vdi.vtk_pipeline.drawing.overlap import group_of
 from pyvista_vdi.vtk_pipeline.drawing.planner import Planner
-from pyvista_vdi.vtk_pipeline.drawing.screen import ImageTexture, NoDepth, place_image, show_image
+from pyvista_vdi.vtk_pipeline.drawing.screen import ImageTexture, NoDepth, place_image
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.interaction.timer import PERIOD, Timer
@@ -123,7 +123,6 @@ class Driver(Planner):
         self._window = weakref.ref(window)
         # A selection draws numbers where the last frame showed something
         if renderer.GetSelector() is None:
-            show_image(actor, renderer)
             with suppress(VDIError):  # which what is drawn says
                 self.box.Update()
             self._last = self._guarded(self._paint, frame) or self._last

@@ -159,7 +159,7 @@ class Frame:
             origins = table[:, :3] @ turn.T + self.to_view[:3, 3]
             rows = np.hstack([origins, table[:, 3:] @ np.linalg.inv(turn)]).tolist()
         nearest, farthest = depths_of(self.camera.model_transform, bounds)
-        near, far = (float(d) for d in self.view_depth(np.array([0.0, 1.0])))
+        near, far = self.view_depth(np.array([0.0, 1.0])).tolist()
         slack = _PLANE_SLACK * max(abs(nearest), abs(farthest))
         if near > nearest + slack:
             rows.append([0, 0, -near, 0, 0, -1])
@@ -208,11 +208,12 @@ def consumers(prop: Any) -> list[Any]:
     """Return the renderers that show a prop, the assemblies that it is a part of, and theirs."""
     found, props = [], [] if prop is None else [prop]
     for each in props:
-        there = [each.GetConsumer(i) for i in range(each.GetNumberOfConsumers())]
-        found += [consumer for consumer in there if consumer is not None]
-        props += [
-            consumer for consumer in found if consumer.IsA("vtkProp") and consumer not in props
-        ]
+        for i in range(each.GetNumberOfConsumers()):
+            consumer = each.GetConsumer(i)
+            if consumer is not None:
+                found.append(consumer)
+                if consumer.IsA("vtkProp") and consumer not in props:
+                    props.append(consumer)
     return found
 
 

@@ -97,9 +97,11 @@ class Planner:
     @property
     def renderers(self) -> list[Any]:
         """All renderers that show the actor, by itself or as a part of an assembly."""
-        return list(
-            dict.fromkeys(each for each in consumers(self.actor()) if each.IsA("vtkRenderer"))
-        )
+        found: list[Any] = []
+        for each in consumers(self.actor()):
+            if each.IsA("vtkRenderer") and each not in found:
+                found.append(each)
+        return found
 
     # What a frame shows
 

@@ -83,36 +83,59 @@ class NoDepth(_Texture):
         self._texture.Activate()
 
 
-_DECLARATION = "//VTK::Base::Dec\nuniform sampler2D vdiImage;\n"
-
-#: A sampler takes the number of its texture unit, and VTK knows of no custom uniform of that kind:
-#: it sets an integer, and declares it, which is no declaration of the sampler under another name.
-_UNIFORMS = """
-#define vdiImage vdiImageUnit
-//VTK::CustomUniforms::Dec
-#undef vdiImage
-"""
-
 #: Where the viewport is in the framebuffer, pixels: left edge, upper edge, 1 / width, -1 / height.
 _VIEWPORT = "vdiViewport"
 
-#: The image is premultiplied RGBA of the whole viewport, top row first. The pixel's place is taken
-#: from its number: from a vertex position it would take three matrices, per pixel.
-#: finalizeRayCast keeps window and level, and selections.
-_LOOKUP = f"""
-  g_fragColor = texture(vdiImage, (gl_FragCoord.xy - {_VIEWPORT}.xy) * {_VIEWPORT}.zw);
-  finalizeRayCast();
-"""
+#: What stands in place of VTK's ray caster, in whose shader VTK looks for tags whenever a headlight
+#: moves: so short a text takes no time. The image is premultiplied RGBA of the whole viewport, top
+#: row first. The pixel's place is taken from its number: from a vertex position it would take three
+#: matrices, per pixel. Window and level, and selections, are as in VTK's.
+#: A sampler takes the number of its texture unit, and VTK knows of no custom uniform of that kind:
+#: it sets an integer, and declares it, which is no declaration of the sampler under another name.
+#: VTK calls the three functions. Where volumes are peeled it has rays cast between two layers of
+#: translucent geometry, again and again: the picture cannot be taken apart, and is given whole to
+#: what begins at the near plane, and so lies before all that is translucent, as without peeling.
+_LOOKUP = f"""//VTK::System::Dec
+//VTK::Output::Dec
+in vec3 ip_textureCoords;
+in vec3 ip_vertexPos;
+vec4 g_fragColor = vec4(0.0);
+uniform sampler2D vdiImage;
+uniform float in_scale;
+uniform float in_bias;
+//VTK::Picking::Dec
+//VTK::DepthPeeling::Dec
+#define vdiImage vdiImageUnit
+//VTK::CustomUniforms::Dec
+#undef vdiImage
 
-#: Where volumes are peeled VTK has its ray caster draw what lies between two layers of translucent
-#: geometry, again and again, and ``castRay`` is called from what stands in place of the call. The
-#: picture cannot be taken apart: it is given whole to what begins at the near plane, and so lies
-#: before all that is translucent, as without peeling of volumes.
-_PEELED = f"""
-#define castRay(zStart, zEnd) ((zStart) > 0.0 ? vec4(0.0) : \\
-  (g_fragColor = texture(vdiImage, (gl_FragCoord.xy - {_VIEWPORT}.xy) * {_VIEWPORT}.zw)))
-//VTK::CallWorker::Impl
-#undef castRay
+// What VTK's calls name, for rays of its own
+uniform vec2 in_inverseWindowSize;
+const float g_opacityThreshold = 1.0;
+mat4 g_texToView, in_projectionMatrix, in_modelViewMatrix;
+mat4 in_volumeMatrix[1], in_textureDatasetMatrix[1];
+
+void initializeRayCast() {{}}
+
+vec4 castRay(const float zStart, const float zEnd)
+{{
+  if (zStart > 0.0)
+    return vec4(0.0);
+  g_fragColor = texture(vdiImage, (gl_FragCoord.xy - {_VIEWPORT}.xy) * {_VIEWPORT}.zw);
+  return g_fragColor;
+}}
+
+void finalizeRayCast()
+{{
+  //VTK::Picking::Exit
+  g_fragColor.rgb = g_fragColor.rgb * in_scale + in_bias * g_fragColor.a;
+  gl_FragData[0] = g_fragColor;
+}}
+
+void main()
+{{
+  //VTK::CallWorker::Impl
+}}
 """
 
 #: For boxes that float32 cannot place: one about the origin, whose front or back face, whichever is
@@ -123,30 +146,10 @@ _FILL = """
 
 _POSITION = "//VTK::ComputeClipPos::Impl"
 
-#: What takes the place of VTK's tags: nothing where only its ray caster needs it, and render passes
-#: would add to it.
-_REPLACED = {
-    "//VTK::Base::Dec": _DECLARATION,
-    "//VTK::CustomUniforms::Dec": _UNIFORMS,
-    "//VTK::ComputeLighting::Dec": "",
-    "//VTK::ComputeColor::Dec": "",
-    "//VTK::Shading::Impl": "",
-    "//VTK::RenderToImage::Impl": "",
-}
 
-
-def show_image(actor: Any, renderer: Any = None) -> None:
-    """Make an actor's shader look its colours up in an image of the viewport, as a renderer draws.
-
-    A property that is modified has the shader rebuilt, so what is in place is left.
-    """
-    shader = actor.GetShaderProperty()
-    peeled = renderer is not None and renderer.GetUseDepthPeelingForVolumes()
-    looked_up = _PEELED if peeled and renderer.GetUseDepthPeeling() else _LOOKUP
-    if vars(shader).get("looked_up") != looked_up:
-        vars(shader)["looked_up"] = looked_up
-        for tag, text in {**_REPLACED, "//VTK::CallWorker::Impl": looked_up}.items():
-            shader.AddFragmentShaderReplacement(tag, True, text, False)
+def show_image(actor: Any) -> None:
+    """Make an actor's shader look its colours up in an image of the viewport."""
+    actor.GetShaderProperty().SetFragmentShaderCode(_LOOKUP)
 
 
 def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:
@@ -159,7 +162,10 @@ def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int,
 
 
 def fill_viewport(actor: Any, edge: float | None) -> None:
-    """Fill the viewport with a cube about the origin, of that edge; ``None``: boxes are boxes."""
+    """Fill the viewport with a cube about the origin, of that edge; ``None``: boxes are boxes.
+
+    A property that is modified has the shader rebuilt, so what is in place is left.
+    """
     shader = actor.GetShaderProperty()
     text = None if edge is None else _FILL.format(scale=2 / edge)
     if text == vars(shader).get("filled"):

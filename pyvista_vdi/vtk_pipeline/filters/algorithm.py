@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -14,10 +14,9 @@ from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.filters.properties import check_property, color_function
 from pyvista_vdi.vtk_pipeline.filters.view import camera_of
 
-_PIPELINE = vtk.vtkStreamingDemandDrivenPipeline
-TIME_STEPS = _PIPELINE.TIME_STEPS()
-WHOLE_EXTENT = _PIPELINE.WHOLE_EXTENT()
-UPDATE_TIME_STEP = _PIPELINE.UPDATE_TIME_STEP()
+PIPELINE = vtk.vtkStreamingDemandDrivenPipeline
+WHOLE_EXTENT = PIPELINE.WHOLE_EXTENT()
+UPDATE_TIME_STEP = PIPELINE.UPDATE_TIME_STEP()
 
 
 class Algorithm(vtk.VTKPythonAlgorithmBase):
@@ -249,17 +248,6 @@ def announce(
     vtk.vtkDataObject.SetPointDataActiveScalarInfo(information, *scalars)
 
 
-def announce_times(outputs: Any, times: Sequence[float]) -> None:
-    """Tell the pipeline the times of the steps; that there are none, if so."""
-    information = outputs.GetInformationObject(0)
-    if times:
-        information.Set(TIME_STEPS, times, len(times))
-        information.Set(_PIPELINE.TIME_RANGE(), (times[0], times[-1]), 2)
-    else:
-        information.Remove(TIME_STEPS)
-        information.Remove(_PIPELINE.TIME_RANGE())
-
-
 def wanted_time(information: Any) -> float | None:
     """Return the time that is asked of a port; ``None`` if none is."""
     return information.Get(UPDATE_TIME_STEP) if information.Has(UPDATE_TIME_STEP) else None
@@ -270,4 +258,4 @@ def ask_for_all(inputs: Any) -> None:
     information = inputs[0].GetInformationObject(0)
     if information is not None and information.Has(WHOLE_EXTENT):
         whole = information.Get(WHOLE_EXTENT)
-        information.Set(_PIPELINE.UPDATE_EXTENT(), whole, 6)
+        information.Set(PIPELINE.UPDATE_EXTENT(), whole, 6)

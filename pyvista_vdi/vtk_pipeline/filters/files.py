@@ -16,10 +16,10 @@ from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.vdi import picture_size
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
+    PIPELINE,
     Algorithm,
     accessors,
     announce,
-    announce_times,
     ask_for_all,
     wanted_time,
 )
@@ -74,7 +74,14 @@ class VDIReader(VDIFileAlgorithm):
             self._series = read(path) if holds(path) == "series" else None
         self.picture_size = picture_size(about.window_size, about.metadata) if about else None
         announce(outputs, about.window_size if about else (1, 1))
-        announce_times(outputs, () if self._series is None else self._series.times or ())
+        times = () if self._series is None else self._series.times or ()
+        information = outputs.GetInformationObject(0)
+        ends = (times[0], times[-1]) if times else ()
+        for key, told in ((PIPELINE.TIME_STEPS(), times), (PIPELINE.TIME_RANGE(), ends)):
+            if told:
+                information.Set(key, told, len(told))
+            else:
+                information.Remove(key)
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:

@@ -7,7 +7,6 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io import to_bytes
@@ -28,12 +27,8 @@ from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, to_vtk, vdi_f
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 from pyvista_vdi.vtk_pipeline.vtk import VTK_UNSIGNED_CHAR, vtkImageData
 
-#: Point scalars of the picture: straight RGBA, uint8.
-STRAIGHT = "RGBA"
-#: Their type and components.
+#: Type and components of the picture's point scalars.
 SCALARS = (VTK_UNSIGNED_CHAR, 4)
-#: Its other point array: what was rendered, premultiplied RGBA, float32.
-PREMULTIPLIED = "premultiplied"
 
 _DEGREES = Number("finite degrees", -math.inf, open_ended=True, name="the angle of a view")
 
@@ -107,7 +102,12 @@ class VDIToImage(SceneAlgorithm):
         announce(outputs, size, SCALARS)
         ask_for_all([outputs])
         pixels = render_vdi(vdi, FrameRequest(view, size, device=self.GetDevice()))
-        vtkImageData.GetData(outputs, 0).ShallowCopy(rgba_to_image(pixels))
+        bottom_first = np.ascontiguousarray(pixels[::-1])
+        image = vtkImageData()
+        image.SetDimensions(*size, 1)
+        image.GetPointData().SetScalars(to_vtk("RGBA", to_bytes(bottom_first).reshape(-1, 4)))
+        image.GetPointData().AddArray(to_vtk("premultiplied", bottom_first.reshape(-1, 4)))
+        vtkImageData.GetData(outputs, 0).ShallowCopy(image)
 
     def _classified(self, vdi: VDI | DeferredVDI) -> VDI:
         """Return a VDI, or what the volume property shows of one that keeps values."""
@@ -129,15 +129,3 @@ class VDIToImage(SceneAlgorithm):
         if self._vdi is None or key is None or key != self._vdi_of:
             self._vdi, self._vdi_of = vdi_from_image(image), key
         return self._vdi
-
-
-def rgba_to_image(pixels: NDArray[np.float32]) -> vtkImageData:
-    """Return a rendered picture, (H, W, 4), as :class:`VDIToImage` puts it out."""
-    height, width = pixels.shape[:2]
-    image = vtkImageData()
-    image.SetDimensions(width, height, 1)
-    bottom_first = np.ascontiguousarray(pixels[::-1])
-    for name, values in ((STRAIGHT, to_bytes(bottom_first)), (PREMULTIPLIED, bottom_first)):
-        image.GetPointData().AddArray(to_vtk(name, values.reshape(-1, 4)))
-    image.GetPointData().SetActiveScalars(STRAIGHT)
-    return image

@@ -70,26 +70,15 @@ class VDIStatus:
         return self.samples / self.full_samples if self.full_samples else 0.0
 
     def __str__(self) -> str:
-        if self.mode == "none":
-            parts = ["no VDI drawn yet"]
-        else:
-            what = f"{self.mode}, the volume itself" if self.drawn == "volume" else self.mode
-            parts = [f"{what}: {self.share:.0%} of {self.full_samples} pixels"]
-        if self.fps is not None:
-            parts.append(f"{self.fps:.3g} frames/s")
-        if self.angle is not None:
-            parts.append(f"{self.angle:.0f}° from the generating view")
-        if self.coverage is not None and self.coverage < 1:
-            parts.append(f"{self.coverage:.0%} covered")
-        if self.ssim is not None:
-            parts.append(f"SSIM about {self.ssim:.3f}")
-        if self.time is not None:
-            parts.append(f"time {self.time:g}")
-        elif self.generation:
-            parts.append(f"VDI no. {self.generation}")
-        chosen = None if self.vdi is None else describe(self.vdi.metadata)
-        if chosen is not None:
-            parts.append(chosen)
-        if self.progress is not None:
-            parts.append(f"making the next: {self.progress:.0%}")
-        return ", ".join(parts)
+        what = f"{self.mode}, the volume itself" if self.drawn == "volume" else self.mode
+        told = [
+            (self.fps, "{:.3g} frames/s"),
+            (self.angle, "{:.0f}° from the generating view"),
+            (self.ssim, "SSIM about {:.3f}"),
+            (self.time, "time {:g}"),
+            (self.generation or None, "VDI no. {}"),
+            (None if self.vdi is None else describe(self.vdi.metadata), "{}"),
+            (self.progress, "making the next: {:.0%}"),
+        ]
+        parts = [f"{what}: {self.share:.0%} of {self.full_samples} pixels"]
+        return ", ".join(parts + [text.format(value) for value, text in told if value is not None])

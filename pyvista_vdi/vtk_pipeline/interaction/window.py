@@ -101,7 +101,7 @@ class Window:
         self.of_frame: dict[Any, Any] = {}
         self.active = vtkWeakReference()
         self._window = weakly(window)
-        self._renderers: list[Callable[[], Any]] = []  # that have drawn a VDI
+        self._renderers: dict[str, Callable[[], Any]] = {}  # that have drawn a VDI
         self._known: list[Callable[[], Any]] = []
         self._given_up: int | None = None  # the window's multisampling, in a frame without it
         self._blit: Any = None  # how the window shows its frames, in one that goes another way
@@ -123,10 +123,11 @@ class Window:
 
     def shown_in(self, renderer: Any) -> list[ShownVolume]:
         """Return the volumes that a renderer of this window shows, in its order."""
-        key = ("shown", renderer.GetAddressAsString(""))
+        address = renderer.GetAddressAsString("")
+        key, known = ("shown", address), self._renderers.get(address)
         if key not in self.of_frame or not self.drawing:
-            if not any(known() is renderer for known in self._renderers):
-                self._renderers.append(weakly(renderer))
+            if known is None or known() is not renderer:
+                self._renderers[address] = weakly(renderer)
                 weak = weakref.ref(self)
 
                 def camera_changed(*_: Any) -> None:
@@ -144,7 +145,7 @@ class Window:
     def shown(self) -> list[tuple[Any, ShownVolume]]:
         """Return the VDIs of this window, each with the renderer that shows it."""
         window, found = self._window(), []
-        for known in self._renderers:
+        for known in self._renderers.values():
             renderer = known()
             if renderer is not None and window.HasRenderer(renderer):
                 found += [(renderer, v) for v in self.shown_in(renderer) if v.driver is not None]

@@ -47,7 +47,7 @@ def run(ranks, program, *arguments):
 def test_four_ranks_make_the_vdi_of_the_same_blocks_and_all_say_what_fails(
     tmp_path, default_runtime
 ):
-    volume = volume_of("uint8")
+    volume = volume_of("float32")
     function = transfer_for(volume, "linear", gradient_opacities=[0.2, 1], gradient_range=(0, 30))
     camera = VIEWS["all of it"](volume)
     arguments = (volume, camera, WINDOW, function)
