@@ -160,14 +160,6 @@ class DeferredVDI(Lists):
         ------
         UnsupportedError
             If the transfer function asks for light or gradient opacity, which no list knows.
-        InvalidArgumentError, MissingDependencyError, NoDeviceError
-            As for :func:`pyvista_vdi.generate`.
-
-        Examples
-        --------
-        >>> import pyvista_vdi as pvdi
-        >>> kept = pvdi.read("values.vdi")  # doctest: +SKIP
-        >>> bone = kept.classified(cmap="bone", opacity=[0, 0, 0.4, 0.9])  # doctest: +SKIP
         """
         return registry.method("DeferredVDI.classified")(self, look)  # type: ignore[no-any-return]
 
