@@ -38,12 +38,10 @@ class View:
     size: tuple[int, int]
 
     def distance(self, other: "View", bounds: tuple[float, ...]) -> float:
-        """Return by how much the corners of a volume's bounds differ between two pictures.
+        """Return the largest distance of a corner's places in two pictures, in half heights.
 
-        Largest distance of a corner's places in the two pictures, each from the picture's centre
-        ray and in its own pixels, over half this picture's height. 0 for the same view; about the
-        angle in radians where an object that fills the picture is turned; infinite where a corner
-        is behind an eye. It sees turning, panning, zooming and resizing alike.
+        About the angle in radians where an object that fills the picture is turned; infinite where
+        a corner is behind an eye.
         """
         if self == other:
             return 0.0
@@ -61,21 +59,12 @@ def covering_view(
     window_size: Sequence[int],
     corners: ArrayLike,
 ) -> tuple[Camera, tuple[int, int]] | None:
-    """Move a view's window so that it covers a volume, and nothing else.
+    """Return a view, and its size, whose window covers the hull of corners, and nothing else.
 
-    Eye, direction and the pixels' size and borders stay as they are on the screen; the window
-    becomes the smallest rectangle of whole pixels of that (unlimited) grid which contains the
-    projected corners. So V_N = V_O hits every list on its centre ray, and neither panning nor
-    zooming out shows a cut edge.
-
-    ``camera``: the view on the screen, with the model transform in it. ``window_size``: the
-    screen's width and height in pixels. ``corners`` (float, shape (n, 3)): points whose convex hull
-    contains the volume, model frame. Where the rectangle would need more lists than
-    :data:`MAX_LISTS_PER_PIXEL` times the window's pixels, they become larger than pixels, square as
-    before, and their borders no longer coincide. Returns: The view with its own window centre and
-    view angle (or parallel scale), and its window size. ``None`` if a corner is behind the eye or
-    closer than a thousandth of the corners' diagonal: no window can cover them. Raises
-    InvalidArgumentError if the window size is out of range.
+    Eye, direction, the pixels' size and their borders stay as they are on the screen, so that
+    V_N = V_O hits every list on its centre ray. Where that took more lists than
+    :data:`MAX_LISTS_PER_PIXEL` times the window's pixels, they become larger. ``None`` where no
+    window can cover the corners: see :func:`projected`.
 
     With t the tangents of the half angles and c the window centre, the pixel rectangle [x0, x1) of
     width w in a window of width W has t' = t w / W and c' t' = t (c + (x0 + x1) / W - 1); the same
@@ -110,16 +99,10 @@ def covering_view(
 
 
 def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
-    """Return the share of a view's rays through the volume that the VDI has all of.
+    """Return the share of a view's rays through the volume that the VDI has all of, 0 to 1.
 
-    Below 1 a part of the volume that the view shows lies outside V_O's window, or behind V_O's eye.
-
-    ``vdi``: its camera and window say what it has. ``camera``: the new view V_N. ``window_size``:
-    width and height of its picture in pixels. Returns: 0 to 1, of the rays of :func:`_seen`; 1
-    where none of them meets the volume.
-
-    V_O's window and what lies before its eye are convex: they contain a part of a ray if they
-    contain its two ends.
+    Of the rays of :func:`_seen`. V_O's window and what lies before its eye are convex: they contain
+    a part of a ray if they contain its two ends.
     """
     to_lists = vdi.camera.viewport_matrix(vdi.window_size) @ vdi.camera.model_to_view
     if _in_window(to_lists, bounds_corners(vdi.bounds)).all():  # as with coverage="bounds"
@@ -143,14 +126,11 @@ def nearest_depth(grid: Grid, camera: Camera, window_size: Sequence[int]) -> flo
 
 
 def required_level(levels: Sequence[Grid], camera: Camera, window_size: Sequence[int]) -> int:
-    """Return the level of a multi-scale volume that a view requires.
+    """Return which of the levels of a volume, the finest first, a view requires.
 
     It is the coarsest whose voxels are still as fine as half a list's width where the volume is
     nearest to V_O: between the lists, what a finer one has more is hardly seen. Edges of voxels
     count along the axes in which a level is coarser: many stores keep their few planes in all.
-
-    ``levels``: from the finest to the coarsest. ``camera``: V_O. ``window_size``: lists of V_O
-    along x and y.
     """
     depth = nearest_depth(levels[0], camera, window_size)
     if depth is None:  # V_O sees nothing of the volume

@@ -17,10 +17,6 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
     Until then the data are under a temporary name in the same folder; on any failure, an
     interrupt included, they are removed and what was at ``path`` stays as it was.
-
-    ``path``: the target. A symbolic link is followed. Yields: Seekable binary file. Raises
-    VDIFileError if the target cannot be written; when the block is entered, or when the disk is
-    full.
     """
     target, temporary, stream = _begun(path)
     try:
