@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from importlib.util import find_spec
@@ -59,25 +58,9 @@ def _composite(mode: Any) -> str:
     )
 
 
-class Described(Options):
-    """Options of which metadata tell those that are given."""
-
-    def describe(self) -> dict[str, Any]:
-        """Return what differs from the defaults; what JSON cannot hold as a short description."""
-        found = {}
-        for name, given in self.given.items():
-            value = given.to_dict() if isinstance(given, TransferFunction) else given
-            value = value.tolist() if hasattr(value, "tolist") else value
-            try:
-                found[name] = json.loads(json.dumps(value, allow_nan=False))
-            except (TypeError, ValueError):
-                found[name] = getattr(value, "name", None) or type(value).__name__
-        return found
-
-
 @record
 @dataclass(frozen=True, eq=False)
-class ArrayChoice(Described):
+class ArrayChoice(Options):
     """``add_volume``'s arguments that say which scalars are seen, and how along a ray."""
 
     scalars: ScalarsLike | None = option(
@@ -99,7 +82,7 @@ class ArrayChoice(Described):
 
 @record
 @dataclass(frozen=True, eq=False)
-class Look(Described):
+class Look(Options):
     """``add_volume``'s arguments that say what a scalar looks like, with its names and defaults.
 
     ``interpolation``, which ``add_volume`` leaves at VTK's default, is one of them. What is not

@@ -14,8 +14,7 @@ from pyvista_vdi.errors import (
     InvalidVolumeError,
     InvalidVolumeTypeError,
 )
-from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.volume import Volume
 
 

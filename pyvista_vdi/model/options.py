@@ -8,11 +8,12 @@ of the command line, Set and Get of VTK's filters, and ParaView's properties.
 
 from __future__ import annotations
 
+import json
 import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cache, partial
+from functools import partial
 from typing import Any, ClassVar, Literal, TypeAlias, TypeVar, get_args, get_origin
 
 import numpy as np
@@ -190,6 +191,18 @@ class Options:
                 found[name] = value
         return found
 
+    def describe(self) -> dict[str, Any]:
+        """Return :attr:`given` for metadata; what JSON cannot hold as a short description."""
+        found = {}
+        for name, given in self.given.items():
+            value = given.to_dict() if isinstance(given, TransferFunction) else given
+            value = value.tolist() if hasattr(value, "tolist") else value
+            try:
+                found[name] = json.loads(json.dumps(value, allow_nan=False))
+            except (TypeError, ValueError):
+                found[name] = getattr(value, "name", None) or type(value).__name__
+        return found
+
 
 def record(cls: type[_Record]) -> type[_Record]:
     """Gather the options that a record's fields declare; for classes, above ``@dataclass``."""
@@ -201,24 +214,17 @@ def record(cls: type[_Record]) -> type[_Record]:
 
 def entries(options: Iterable[Option], indent: int = 4) -> str:
     """Return what documentation has of options, as numpydoc's parameters."""
-    return "".join(_entry(o.name, o.kind, o.choices, o.what, o.more, indent) for o in options)
-
-
-@cache
-def _entry(
-    name: str, kind: str, choices: tuple[str, ...], what: str, more: str, indent: int
-) -> str:
-    words = [_WORDS.get(part, part) for part in kind.split(" | ") if part != "None"]
-    if choices:
-        words = ["{" + ", ".join(f'"{each}"' for each in choices) + "}"]
-    optional = ", optional" if "None" in kind else ""
-    margin = " " * (indent + 4)
-    text = f"{what[0].upper()}{what[1:]}. {more}".rstrip()
-    lines = textwrap.wrap(text, 100 - indent - 4, break_long_words=False)
-    return "".join(
-        [f"{margin[4:]}{name} : {' or '.join(words)}{optional}\n"]
-        + [f"{margin}{line}\n" for line in lines]
-    )
+    margin, text = " " * indent, ""
+    for told in options:
+        words = [_WORDS.get(part, part) for part in told.kind.split(" | ") if part != "None"]
+        if told.choices:
+            words = ["{" + ", ".join(f'"{each}"' for each in told.choices) + "}"]
+        optional = ", optional" if "None" in told.kind else ""
+        text += f"{margin}{told.name} : {' or '.join(words)}{optional}\n"
+        said = f"{told.what[0].upper()}{told.what[1:]}. {told.more}".rstrip()
+        lines = textwrap.wrap(said, 100 - indent - 4, break_long_words=False)
+        text += "".join(f"{margin}    {line}\n" for line in lines)
+    return text
 
 
 @record

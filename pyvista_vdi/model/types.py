@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     from pyvista_vdi.model.camera import Camera
     from pyvista_vdi.model.collection import VDICollection
     from pyvista_vdi.model.cropping import Cropping
-    from pyvista_vdi.model.deferred import DeferredVDI
     from pyvista_vdi.model.lighting import Light, Lights
-    from pyvista_vdi.model.vdi import VDI
+    from pyvista_vdi.model.vdi import VDI, DeferredVDI
     from pyvista_vdi.model.volume import Volume
 
 

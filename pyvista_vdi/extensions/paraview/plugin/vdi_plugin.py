@@ -38,9 +38,8 @@ from pyvista_vdi.extensions.paraview.parts.properties import (
     properties,
     view_xml,
 )
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.vtk_pipeline.filters.algorithm import accessors, watch
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image, scalars_of
 
