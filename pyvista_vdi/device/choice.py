@@ -16,7 +16,7 @@ from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError
 
 PROBE_COUNT, PROBE_GROUP = 256, 32
 # OpenCL 1.2 allows expm1 and exp 3 ulp, log1p 2 ulp (section 7.4); one ulp is at most 2^-23 of the
-# value; the fourth is for the reference, which is rounded to single precision nowhere.
+# value; the fourth is for the reference, which is rounded to float32 nowhere.
 PROBE_RTOL = 4 * 2.0**-23
 
 _lock = threading.RLock()

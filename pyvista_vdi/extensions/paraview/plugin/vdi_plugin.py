@@ -194,7 +194,7 @@ class VDIFileWriter(vtk_pipeline.VDIWriter):
     """Writes a VDI to a file: :class:`pyvista_vdi.vtk_pipeline.VDIWriter`."""
 
     def SetPrecisionName(self, name: str) -> None:
-        """Set the precision; "usual" is that of the VDI."""
+        """Set what a supersegment takes; "usual" is that of the VDI."""
         self.SetPrecision(None if name == "usual" else name)
 
     def SetCompressionName(self, name: str) -> None:
