@@ -64,8 +64,8 @@ class VDICollection(Sequence[VDI]):
 
         The target's name ends in ``.vdis`` for a series, in ``.vdiset`` for a set, or in ``.html``.
         The options are those of :meth:`VDI.save`; supersegments take 8 bytes by default, those of
-        a series what its first step's take. Pages have ``title`` and ``background`` as well, and those of a
-        series ``autoplay``.
+        a series what its first step's take. Pages have ``title`` and ``background`` as well, and
+        those of a series ``autoplay``.
         """
         method = registry.method(f"{type(self).__name__}.save")
         return method(self, path, **options)  # type: ignore[no-any-return]
