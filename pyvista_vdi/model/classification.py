@@ -134,11 +134,7 @@ class Look(Options):
 @record
 @dataclass(frozen=True, eq=False)
 class Classification(Look, ArrayChoice):
-    """The classification arguments of one call, checked.
-
-    InvalidArgumentError if ``transfer_function`` or ``volume_property`` is mixed with arguments
-    that it replaces, or a value cannot be used.
-    """
+    """The classification arguments of one call, checked."""
 
     volume_property: VTKObject | None = option(None, "in place of the others, as it is")
     transfer_function: TransferFunction | None = option(
@@ -161,9 +157,7 @@ class Classification(Look, ArrayChoice):
     ) -> Classification:
         """Return the classification of a VDI by arguments that a function was given.
 
-        ``others`` are the function's other keyword arguments: a TypeError for an unknown name
-        suggests the nearest one. InvalidArgumentError or UnsupportedError if a value cannot be
-        used.
+        ``others`` are the function's other keyword arguments, for a TypeError that suggests one.
         """
         refuse_unknown(given, function, (*declared(Classification), *others))
         return cls(**given)
@@ -178,12 +172,7 @@ class Classification(Look, ArrayChoice):
             )
 
     def transfer_function_of(self, volume: Volume) -> TransferFunction:
-        """Return the transfer function that the arguments describe for a volume.
-
-        InvalidArgumentError if a colour map, an opacity or another value is not one that
-        ``add_volume`` takes, MissingDependencyError if PyVista is needed to build it and not
-        installed.
-        """
+        """Return the transfer function that the arguments describe for a volume."""
         table: Any = self.transfer_function
         if isinstance(table, TransferFunction):
             return table

@@ -39,7 +39,6 @@ from pyvista_vdi.model.types import (
     Criterion,
     DeviceLike,
     Draw,
-    Metadata,
     Policy,
     Precision,
     Progress,
@@ -59,10 +58,6 @@ MAX_PREVIEW_SAMPLES = 2**23
 
 #: Origin and normal of each plane; the side that the normal points to is kept.
 Planes: TypeAlias = tuple[tuple[float, ...], ...]
-
-#: What may decide where a list is cut that must be shortened; ``docs/concepts.md`` says what each
-#: means. The first is the default.
-CRITERIA: tuple[Criterion, ...] = get_args(Criterion)
 
 #: The SSIM that a name asks for. "reference" asks for nothing: it is what is made without a target.
 QUALITIES: dict[str, float | None] = {
@@ -86,15 +81,12 @@ RECORDS: list[type[Options]] = []
 
 @dataclass(frozen=True)
 class Option:
-    """An option, as it is declared: an argument's ``name``, its ``default``, ``what`` it means.
+    """An option, as it is declared.
 
-    ``what`` is a sentence that begins small and has no full stop, ``more`` are sentences that
-    documentation has behind it. ``kind`` is the type of the argument, as it is written in Python.
-    ``check`` returns a value as it is kept, or raises InvalidArgumentError; without one a value is
-    one of the choices, a truth value where the default is one, and else whatever is given.
-    ``choices`` are the texts that are taken, where these are all; a ``setting`` is seldom turned,
-    and stands in :class:`Settings`;
-    ``standard`` is the default as it is kept.
+    ``what`` is a sentence that begins small without a full stop, ``more`` those behind it; ``kind``
+    is the argument's type. ``check`` returns a value as it is kept, or raises InvalidArgumentError;
+    without one it is one of the ``choices``, a truth value where the default is one, or anything. A
+    ``setting`` stands in :class:`Settings`; ``standard`` is the default as it is kept.
     """
 
     name: str
@@ -422,11 +414,7 @@ class QualityTarget(Options):
 
 @dataclass(frozen=True, eq=False)
 class GenerationRequest:
-    """A VDI that is asked for: of what, from where, and how; carried whole to what makes it.
-
-    InvalidCameraError or InvalidArgumentError if the camera, the window or ``progress`` cannot be
-    used.
-    """
+    """A VDI that is asked for: of what, from where, and how; carried whole to what makes it."""
 
     volume: Volume
     transfer_function: TransferFunction
@@ -435,7 +423,7 @@ class GenerationRequest:
     options: GenerationOptions = field(default_factory=GenerationOptions)
     device: DeviceLike | None = None
     progress: Progress | None = None  # called between slices of work; False gives it up
-    metadata: Metadata = field(default_factory=dict)  # entries to add to those of the VDI
+    metadata: Mapping[str, Any] = field(default_factory=dict)  # entries to add to those of the VDI
 
     def __post_init__(self) -> None:
         check_callback(self.progress)
@@ -446,10 +434,7 @@ class GenerationRequest:
 
 
 def checked_planes(planes: Any) -> Planes:
-    """Return clipping planes as tuples of six floats; none for ``None``.
-
-    InvalidArgumentError if the shape is another, a value is not finite or a normal is zero.
-    """
+    """Return clipping planes as tuples of six floats; none for ``None``."""
     if planes is None or (np.iterable(planes) and not [*planes]):
         return ()
     table = as_floats(planes)

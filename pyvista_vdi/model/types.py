@@ -4,7 +4,7 @@ VTK's and PyVista's objects are told by the methods that they have, so that this
 neither.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, Union
 
 from numpy.typing import ArrayLike, NDArray
@@ -70,4 +70,3 @@ Draw: TypeAlias = Literal["auto", "vdi", "volume"]
 When: TypeAlias = Literal["baked", "deferred"]
 #: When a view gets a VDI of its own.
 Policy: TypeAlias = Literal["auto", "never"]
-Metadata: TypeAlias = Mapping[str, Any]

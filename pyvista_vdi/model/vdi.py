@@ -611,7 +611,6 @@ def classify(
     """Return the VDI that a transfer function makes of what is kept (docs/dev/conventions.md).
 
     The VDI's arrays are made when they are asked for, by ``media_of``; a raycast asks for none.
-    Errors are those of :meth:`DeferredVDI.classified`.
     """
     for name, asked in (
         ("shading", transfer_function.shading),

@@ -153,10 +153,7 @@ class Volume(Grid):
         return self
 
     def load(self, *cameras: Any, window_size: Sequence[int] = (1, 1)) -> Volume:
-        """Return the volume in memory, of several levels the one that views require.
-
-        DeviceMemoryError if it is read chunk by chunk, and the host has not so much memory free.
-        """
+        """Return the volume in memory, of several levels the one that views require."""
         found = self.in_view(*cameras, window_size=window_size) if cameras else self
         if not found.chunked:
             return found
