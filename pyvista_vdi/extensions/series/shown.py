@@ -20,7 +20,6 @@ from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.quality.background import BackgroundThread, Job
 from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
-from pyvista_vdi.vtk_pipeline.interaction.timer import period_of
 
 #: Bytes of steps that are kept, so that the next round need not read them.
 MEMORY = 1 << 30
@@ -206,7 +205,6 @@ class SeriesInput(SeveralInput):
             raise InvalidArgumentError(f"rate must be steps per second, above 0; got {rate!r}")
         self.memory = MediumOptions(memory_limit=memory_limit).memory_limit or self.memory
         self.rate, self._loop = as_float(rate), bool(loop)
-        self.period = period_of(self.rate)
         last = len(self.collection) - 1
         self._begin(0 if not loop and self.step == last else self.step)
         self.playing = last > 0

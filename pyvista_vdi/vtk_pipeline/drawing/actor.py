@@ -7,14 +7,15 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
-from pyvista_vdi.raycasting.picking import Pick
+from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit, Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refuse
-from pyvista_vdi.vtk_pipeline.drawing.screen import place_image, show_image
+from pyvista_vdi.vtk_pipeline.drawing.screen import LOOKUP, place_image
 from pyvista_vdi.vtk_pipeline.filters.source import input_of
-from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, framed, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkCamera,
     vtkOpenGLShaderProperty,
     vtkVolume,
     weakly,
@@ -27,7 +28,7 @@ class VDIActorMethods:
     def _become_vdi_actor(self: Any) -> None:
         """Install a shader of its own."""
         super().SetShaderProperty(vtkOpenGLShaderProperty())  # type: ignore[misc]
-        show_image(self)
+        self.GetShaderProperty().SetFragmentShaderCode(LOOKUP)
         place_image(self, 0, (0, 0), (1, 1))
 
     def SetMapper(self: Any, mapper: Any) -> None:
@@ -151,7 +152,9 @@ class VDIActorMethods:
     def opacity_multiplier(self: Any, multiplier: float) -> None:
         self.GetMapper().SetOpacityMultiplier(multiplier)
 
-    def pick(self: Any, x: float, y: float) -> Pick | None:
+    def pick(
+        self: Any, x: float, y: float, opacity_threshold: float = DEFAULT_OPACITY
+    ) -> Pick | None:
         """Return the supersegment that is seen at a place of the window.
 
         Parameters
@@ -159,12 +162,13 @@ class VDIActorMethods:
         x, y : float
             Display coordinates: pixels of the window from its lower left corner, as in VTK's
             events and pickers.
+        opacity_threshold : float
+            Opacity that the ray must reach in the VDI, from its beginning on.
 
         Returns
         -------
         Pick or None
-            The first supersegment that reaches the opacity set by
-            ``GetMapper().SetPickingOpacity(...)``, and where the ray enters it, in world
+            The first supersegment that reaches it, and where the ray enters it, in world
             coordinates. ``None`` where nothing of the VDI is hit, where something opaque hid the
             hit in the last frame, and where the actor is invisible or not pickable.
 
@@ -179,7 +183,8 @@ class VDIActorMethods:
                 "nothing shows this actor yet: add it to a renderer of a window first"
             )
         there = [r for r in shown if r.IsInViewport(int(x), int(y))]
-        return self._driver.pick(there[0], x, y) if there else None  # type: ignore[no-any-return]
+        hit = FirstHit.of(opacity_threshold, accumulated=True)
+        return self._driver.pick(there[0], x, y, hit) if there else None  # type: ignore[no-any-return]
 
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
         """Generate the VDI anew, now.
@@ -229,8 +234,10 @@ class VDIActorMethods:
         return source.GetVDI()  # type: ignore[no-any-return]
 
     def camera_to_come(self, renderer: Any) -> Any:
-        """Return the ``vtkCamera`` of a renderer's next picture."""
-        return camera_to_come(renderer)
+        """Return the camera of a renderer's next picture: its own, or what VTK will make."""
+        if renderer.IsActiveCameraCreated():
+            return renderer.GetActiveCamera()
+        return framed(vtkCamera(), renderer, renderer.ComputeVisiblePropBounds())
 
 
 refuse(VDIActorMethods, OF_ACTORS)

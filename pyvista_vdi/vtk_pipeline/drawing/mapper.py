@@ -15,8 +15,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refuse
 from pyvista_vdi.vtk_pipeline.drawing.settings import add_settings
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input
-from pyvista_vdi.vtk_pipeline.filters.source import VDISource, input_of, input_of_port
+from pyvista_vdi.vtk_pipeline.filters.source import VDISource, input_of
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
@@ -68,24 +67,22 @@ class VDIMapperMethods:
         set_by_hand = None if source is None else source.GetSampleDistance()
         return super().GetSampleDistance() if set_by_hand is None else set_by_hand  # type: ignore[misc]
 
-    def SetInputConnection(self, *args: Any) -> None:
-        """Draw what a :class:`VDISource` (or a reader of canonical images) makes."""
-        port = args[-1]
-        self._set_input(None if port is None else input_of_port(port))
-
-    def SetInputDataObject(self, *args: Any) -> None:
-        """Draw a VDI in its canonical form."""
-        self.SetInputData(args[-1])
-
-    def SetInputData(self, data: Any) -> None:
+    def SetInputData(self: Any, data: Any) -> None:
         """Draw a VDI, its canonical image, a series (:attr:`VDIActor.player`) or a set of VDIs."""
-        self._set_input(None if data is None else input_of(data))
+        self.driver.set_input(None if data is None else input_of(data))
+        self.Modified()
 
     SetVDI = SetInputData
 
+    def SetInputConnection(self, *args: Any) -> None:
+        """Draw what a :class:`VDISource` (or a reader of canonical images) makes."""
+        self.SetInputData(args[-1])
+
+    SetInputDataObject = SetInputConnection
+
     def RemoveInputConnection(self, *args: Any) -> None:
         """Draw nothing any more; RemoveAllInputConnections and RemoveAllInputs do the same."""
-        self._set_input(None)
+        self.SetInputData(None)
 
     RemoveAllInputConnections = RemoveAllInputs = RemoveInputConnection
 
@@ -126,10 +123,6 @@ class VDIMapperMethods:
     def AutoAdjustSampleDistancesOff(self: Any) -> None:
         """Draw every frame in full."""
         self.SetAutoAdjustSampleDistances(False)
-
-    def _set_input(self: Any, source: Input | None) -> None:
-        self.driver.set_input(source)
-        self.Modified()
 
 
 refuse(VDIMapperMethods, OF_MAPPERS)

@@ -95,7 +95,7 @@ _VIEWPORT = "vdiViewport"
 #: VTK calls the three functions. Where volumes are peeled it has rays cast between two layers of
 #: translucent geometry, again and again: the picture cannot be taken apart, and is given whole to
 #: what begins at the near plane, and so lies before all that is translucent, as without peeling.
-_LOOKUP = f"""//VTK::System::Dec
+LOOKUP = f"""//VTK::System::Dec
 //VTK::Output::Dec
 in vec3 ip_textureCoords;
 in vec3 ip_vertexPos;
@@ -145,11 +145,6 @@ _FILL = """
 """
 
 _POSITION = "//VTK::ComputeClipPos::Impl"
-
-
-def show_image(actor: Any) -> None:
-    """Make an actor's shader look its colours up in an image of the viewport."""
-    actor.GetShaderProperty().SetFragmentShaderCode(_LOOKUP)
 
 
 def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:

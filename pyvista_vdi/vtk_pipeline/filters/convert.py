@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import json
 from typing import Any
@@ -168,9 +167,7 @@ def scalars_of(
         for array in arrays[kind]:
             if array.GetName() == name:
                 return array
-    near = difflib.get_close_matches(str(name), [each for each in names if each], n=1)
-    hint = f"did you mean {near[0]!r}? Its" if near else "its"
-    raise UnknownArrayError(f"the volume has no array {name!r}: {hint} arrays are {names}")
+    raise UnknownArrayError(f"the volume has no array {name!r}: its arrays are {names}")
 
 
 def as_numpy(array: vtk.vtkDataArray) -> NDArray[Any]:

@@ -33,8 +33,6 @@ class Input:
     prop: Any = None
     #: The port of what the bounds depend on; ``None`` where they depend on nothing.
     port: Any = None
-    #: Milliseconds between two looks of the event loop at what goes on; ``None``: as usual.
-    period: int | None = None
     #: Whether one step of a series is shown after the other: the event loop has to look at that.
     playing = False
 

@@ -18,7 +18,6 @@ from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
     InvalidVolumeError,
-    warn_external,
 )
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
@@ -50,14 +49,18 @@ from pyvista_vdi.vtk_pipeline.filters.convert import (
     is_vdi_image,
     require_image,
     scalars_of,
-    vdi_from_image,
     vdi_to_image,
     volume_from_vtk,
 )
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
 from pyvista_vdi.vtk_pipeline.filters.view import View, camera_of
-from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkAlgorithmOutput,
+    vtkDataObject,
+    vtkImageData,
+    vtkWeakReference,
+)
 
 #: What two equal sizes of pixels differ by at most.
 ROUNDING = 1e-6
@@ -70,7 +73,6 @@ class Request(GenerationRequest):
     screen: View = None  # type: ignore[assignment]  # what a frame shows it in, before coverage
     target: QualityTarget | None = None
     content: Any = field(default=None, repr=False)  # equal where only the view is another
-    covered: bool = True  # as far as coverage asks
 
     @property
     def key(self) -> Any:
@@ -127,7 +129,7 @@ class VDISource(SceneAlgorithm, Input):
         "coverage",
         "what the VDI covers: its window, ``'view'``, or ``'bounds'``, the smallest rectangle of "
         "the screen's pixel grid that contains the whole volume (where the eye is inside its "
-        "bounds, or they reach behind it, a ``VDIWarning`` is given and the window is used)",
+        "bounds, or they reach behind it, the window)",
         "view",
         partial(one_of, name="coverage", names=("bounds", "view")),
     )
@@ -228,12 +230,6 @@ class VDISource(SceneAlgorithm, Input):
     def MakeVDI(self, request: Request) -> VDI:
         """Return the VDI of a request, made now; what the source has made stays."""
         self.SetAbortExecute(0)  # of this VDI nobody has said it yet
-        if not request.covered:
-            warn_external(
-                "coverage='bounds' needs the eye outside the volume, with all of it in front: the "
-                "VDI covers the current view only (coverage='view'); move the camera back and "
-                "regenerate for the whole volume"
-            )
         asked = request.replace(progress=self._advance)
         if request.target is None:
             return generate_vdi(asked)
@@ -443,19 +439,18 @@ class VDISource(SceneAlgorithm, Input):
         options = replace(self.GetOptions(), lights=lights)
         # Where lights of the scene shine on it, the volume is lit where it stands now
         placed = self.placed if lights.of_scene else None
-        generating, covered = (camera, window_size), True
+        generating = (camera, window_size)
         if placed is not None:
             generating = (camera.replace(model_transform=placed), window_size)
         if self.GetCoverage() == "bounds":
             # The corners of the box of points, model frame: tighter than bounds if rotated
             box = bounds_corners([end for n in volume.dimensions for end in (0, n - 1)])
             corners = np.column_stack([box, np.ones(8)]) @ volume.index_to_model.T[:, :3]
-            wide = covering_view(*generating, corners)
-            covered, generating = wide is not None, wide or generating
+            generating = covering_view(*generating, corners) or generating
         device, metadata = self.GetDevice(), {"scalars": volume.name, **self.GetMetadata()}
         content = (self._volume_key, table, options, placed, target, device, metadata)
         settings = (options, device, None, metadata, View(camera, window_size), target)
-        request = Request(volume, table, camera, window_size, *settings, content, covered)
+        request = Request(volume, table, camera, window_size, *settings, content)
         return request.seen_from(*generating)
 
     def _read(self, image: Any) -> Volume:
@@ -497,14 +492,18 @@ for _told in GenerationOptions.declared.values():
 
 
 def input_of(data: Any) -> Input:
-    """Return what to draw for a VDI, an image of one, a VDISource, or what extensions show."""
-    if isinstance(data, VDI):
-        return Input(data)
+    """Return what to draw for a VDI, an image of one, a port, or what extensions show."""
+    if isinstance(data, vtkAlgorithmOutput):
+        producer = data.GetProducer()
+        if isinstance(producer, VDISource):
+            return producer
+        shown = Input(port=data)
+        shown.vdi()  # refuse what is no VDI now
+        return shown
     if isinstance(data, DeferredInput | VDISource):
         return data
-    if isinstance(data, DeferredVDI) or is_vdi_image(data):
-        # Of values this raises, and says what to do
-        return Input(as_vdi(data if isinstance(data, DeferredVDI) else vdi_from_image(data)))
+    if isinstance(data, VDI | DeferredVDI) or is_vdi_image(data):
+        return Input(as_vdi(data))  # of values this raises, and says what to do
     show = registry.shown(data)
     if show is not None:
         return show(data)  # type: ignore[no-any-return]
@@ -512,13 +511,3 @@ def input_of(data: Any) -> Input:
         f"a VDIMapper draws a VDI, its canonical image, a series, a set or a VDISource's output; "
         f"got {type(data).__name__}: put a VDISource between a volume and the mapper"
     )
-
-
-def input_of_port(port: Any) -> Input:
-    """Return what to draw for an output port."""
-    producer = port.GetProducer()
-    if isinstance(producer, VDISource):
-        return producer
-    shown = Input(port=port)
-    shown.vdi()  # refuse what is no VDI now
-    return shown
