@@ -61,48 +61,6 @@ typedef struct {
     Real depth; // in their sense, see raycasting/first_supersegment.cl
 } Progress;
 
-// Pass by what is empty for the lanes that look, which are in column P; a lane that comes to
-// another stack has a `new_stack` there.
-inline void skip_empty_cells(Progress *now, Int *new_stack, Int looks, int P, const ListRay *rays,
-                             const Axis *p, const Axis *q, const Sense *sense, const Grid *grid,
-                             float depth_origin, bool sweep_v)
-{
-    const int stack_p = P >> STACK_SHIFT;
-    while (ANY(looks)) {
-        // Those in one stack; there is seldom a second one
-        const int stack_q = least_of(now->q, looks) * q->step >> STACK_SHIFT;
-        const Int index_q = now->q * q->step;
-        const Int here = looks && index_q >> STACK_SHIFT == stack_q;
-        looks = looks && !here;
-        const ulong mask = grid->masks[SECOND_OF(stack_p, stack_q) * grid->stacks_wide +
-                                       FIRST_OF(stack_p, stack_q)];
-        Int nearest, nothing;
-        const Int passes =
-            look_ahead(&nearest, &nothing, (Uint)((uint)mask), (Uint)((uint)(mask >> HALF_SLABS)),
-                       sense, now->depth, here, grid, depth_origin);
-        if (!ANY(passes))
-            continue;
-        const int edge_p = stack_edge(p, stack_p << STACK_SHIFT);
-        const int edge_q = stack_edge(q, stack_q << STACK_SHIFT);
-        const Real r_border = fmin(CROSSINGS(p, (Real)(edge_p)), CROSSINGS(q, (Real)(edge_q)));
-        const Real r_until = empty_until(r_border, nearest, nothing, sense, grid, depth_origin);
-        const Int next_p = index_reached(p, (Int)(P), edge_p, r_until);
-        const Int next_q = index_reached(q, index_q, edge_q, r_until);
-        const Int moves = passes && (next_p != P || next_q != index_q);
-        const Real r = r_entered(q, r_entered(p, now->r, (Int)(P), next_p), index_q, next_q);
-        now->r = select(now->r, r, moves);
-        now->depth = select(now->depth, depth_at(sense, r), moves);
-        const Int ends = r_until >= rays->r_begin + 1.0f || next_p < 0 || next_p >= p->lists ||
-                         next_q < 0 || next_q >= q->lists;
-        now->q = select(now->q, next_q * q->step, passes);
-        now->p = select(now->p, select(next_p * p->step, (Int)(NOWHERE), ends), passes);
-        const Int enters =
-            passes && !ends && ((next_p ^ P) | (next_q ^ index_q)) >> STACK_SHIFT != 0;
-        looks = looks || (enters && next_p == P);
-        *new_stack = *new_stack || (enters && next_p != P);
-    }
-}
-
 // The supersegment that each ray has met last and that is not composited yet: that takes as long
 // for one ray as for all, and few of them are in the same supersegment at a time.
 typedef struct {
@@ -160,8 +118,11 @@ __attribute__((always_inline)) inline void sweep(Seen *seen, const ListRay *rays
         const Int looks = column && new_stack;
         if (grid->masks && ANY(looks)) {
             new_stack = new_stack && !looks;
-            skip_empty_cells(&now, &new_stack, looks, P, rays, p, q, &sense, grid, depth_origin,
-                             sweep_v);
+            Int next_p = P, next_q = now.q * q->step, goes_on = looks;
+            skip_empty_cells(&next_p, &next_q, &now.r, &now.depth, &goes_on, looks, p, q, &sense,
+                             grid, r_end, depth_origin);
+            now.p = select(now.p, select((Int)(NOWHERE), next_p * p->step, goes_on), looks);
+            now.q = select(now.q, next_q * q->step, looks);
             column = now.p == place_p;
         }
         const Real r_p = CROSSINGS(p, (Real)(P));
@@ -261,7 +222,11 @@ KERNEL_OF_LANES void raycast_packets(
     begin_ray(&rays, forms, &frame, offsets_from_middle(x, frame.width),
               offsets_from_middle(y, frame.height), opaque_ends(pixels, opaque_depth), in_window);
     const Lists lists = LISTS_OF(frame);
-    const Grid grid = GRID_OF(frame);
+    Grid grid = GRID_OF(frame);
+    if (sweep_v) { // p is v
+        grid.stacks_by_u = grid.stacks_by_v;
+        grid.stacks_by_v = 1;
+    }
 
     Seen seen = nothing_seen();
     Axis p = axis_of(FIRST_OF(rays.along.x, rays.along.y), FIRST_OF(rays.deep.x, rays.deep.y),

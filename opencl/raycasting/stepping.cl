@@ -4,6 +4,7 @@
 // Who includes this says before of which types the ways of rays along an axis are: Steps, Int or,
 // if all rays of a work-item step the same way, int; Border, Real or float.
 #include "lib/list_space.cl"
+#include "raycasting/lists.cl"
 #include "raycasting/stacks.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -83,29 +84,34 @@ inline Int list_index(const Axis *axis, Real coordinate, int shift)
     return clamp(TO_INT(floor(coordinate + axis->middle)) + shift, 0, axis->lists - 1);
 }
 
+inline Int are_outside(const Axis *u, const Axis *v, Int i, Int j)
+{
+    return i < 0 || i >= u->lists || j < 0 || j >= v->lists;
+}
+
 // The occupancy grid.
 typedef struct {
-    __global const ulong *masks; // of the stacks
-    int stacks_wide;
-    float first_depth; // where slab 0 begins, view depth less depth_origin
+    __global const ulong *masks;  // of the stacks
+    int stacks_by_u, stacks_by_v; // from a stack to the next one by either axis
+    float first_depth;            // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth;
 } Grid;
 
 #define GRID_OF(frame)                                                                             \
-    {masks, STACKS_ALONG((frame).lists_wide), (frame).first_depth, (frame).slabs_per_depth}
+    {masks, 1, STACKS_ALONG((frame).lists_wide), (frame).first_depth, (frame).slabs_per_depth}
 
 // The last index in a stack, in the rays' sense.
-inline Steps stack_edge(const Axis *axis, Steps index)
+inline Int stack_edge(const Axis *axis, Int index)
 {
-    return SELECT(index & ~(STACK - 1), index | (STACK - 1), axis->step > 0);
+    return SELECT(index & ~(STACK - 1), index | (STACK - 1), (Int)(axis->step) > 0);
 }
 
 // The index of the list that stepping from `index`, but not beyond the edge of a stack, would have
 // reached at r_until, by the crossings of its borders: where r_until lies by its coordinates, one
 // back or one on where rounding has it otherwise.
-inline Int index_reached(const Axis *axis, Int index, Steps edge, Real r_until)
+inline Int index_reached(const Axis *axis, Int index, Int edge, Real r_until)
 {
-    const Int behind = (Int)(edge + axis->step);
+    const Int behind = edge + axis->step;
     Int reached = TO_INT(floor(fma(r_until, axis->along, axis->deep) + axis->middle));
     reached = clamp(reached, min(index, behind), max(index, behind));
     const Int too_far = reached != index && crossings(axis, reached - axis->step) > r_until;
@@ -121,25 +127,47 @@ inline Real r_entered(const Axis *axis, Real r, Int from, Int to)
     return SELECT(r, fmax(r, crossings(axis, to - axis->step)), to != from);
 }
 
-// The nearest occupied slab ahead of rays at a depth, in a stack whose mask has these halves.
-// Returns whether rays that look pass by something empty before it.
-inline Int look_ahead(Int *nearest, Int *nothing, Uint low, Uint high, const Sense *sense,
-                      Real depth, Int looks, const Grid *grid, Depths depths)
+// Pass by stacks of cells, and parts of stacks, whose slabs ahead are empty (section 4), for the
+// rays that look, from lists (i, j) along axes u and v; those that come to an end are not `active`
+// any more. In a loop of its own, so that rays meet again behind it. Returns which have moved.
+inline Int skip_empty_cells(Int *i, Int *j, Real *r, Real *depth, Int *active, Int looks,
+                            const Axis *u, const Axis *v, const Sense *sense, const Grid *grid,
+                            Real r_end, Depths depths)
 {
-    const Int slab = slab_of(depth_offset(sense->sign * depth, depths), grid->first_depth,
-                             grid->slabs_per_depth);
-    *nearest = nearest_slab(low, high, slab, sense->away, nothing);
-    return looks && (*nothing || *nearest != slab);
-}
-
-// Up to here nothing is met: the stack's border at r_border, or the face of the nearest occupied
-// slab.
-inline Real empty_until(Real r_border, Int nearest, Int nothing, const Sense *sense,
-                        const Grid *grid, Depths depths)
-{
-    const Real face =
-        grid->first_depth + TO_REAL(sense->away ? nearest : nearest + 1) / grid->slabs_per_depth;
-    const Real r_face =
-        (sense->sign * depth_coordinate(face, depths) - sense->deep) * sense->inverse;
-    return SELECT(r_border, fmin(r_border, r_face), !nothing && sense->along != 0.0f);
+    Int moved = 0;
+    while (ANY(looks)) {
+        // Is the cell empty? Which is the nearest that is not, in this stack?
+        const Int stack =
+            (*j >> STACK_SHIFT) * grid->stacks_by_v + (*i >> STACK_SHIFT) * grid->stacks_by_u;
+        const Words mask = words_at(grid->masks, SELECT((Int)(0), stack, looks));
+        const Int slab = slab_of(depth_offset(sense->sign * *depth, depths), grid->first_depth,
+                                 grid->slabs_per_depth);
+        Int nothing;
+        const Int nearest = nearest_slab(mask.low, mask.high, slab, sense->away, &nothing);
+        const Int passes = looks && (nothing || nearest != slab);
+        if (!ANY(passes))
+            break;
+        // Up to its face, or the stack's border, nothing is met: jump there
+        const Int edge_i = stack_edge(u, *i), edge_j = stack_edge(v, *j);
+        const Real r_border = fmin(crossings(u, edge_i), crossings(v, edge_j));
+        const Real face = grid->first_depth +
+                          TO_REAL(sense->away ? nearest : nearest + 1) / grid->slabs_per_depth;
+        const Real r_face =
+            (sense->sign * depth_coordinate(face, depths) - sense->deep) * sense->inverse;
+        const Real r_until =
+            SELECT(r_border, fmin(r_border, r_face), !nothing && sense->along != 0.0f);
+        const Int next_i = index_reached(u, *i, edge_i, r_until);
+        const Int next_j = index_reached(v, *j, edge_j, r_until);
+        const Int moves = passes && (next_i != *i || next_j != *j);
+        const Real next_r = r_entered(v, r_entered(u, *r, *i, next_i), *j, next_j);
+        *r = SELECT(*r, next_r, moves);
+        *depth = SELECT(*depth, depth_at(sense, next_r), moves);
+        moved = moved || moves;
+        const Int ends = r_until >= r_end || are_outside(u, v, next_i, next_j);
+        looks = passes && !ends && ((next_i ^ *i) | (next_j ^ *j)) >> STACK_SHIFT != 0;
+        *i = SELECT(*i, next_i, passes);
+        *j = SELECT(*j, next_j, passes);
+        *active = *active && !(passes && ends);
+    }
+    return moved;
 }

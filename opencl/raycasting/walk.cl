@@ -85,45 +85,6 @@ inline Cursor begin_walk(const Path *path, const Sense *sense, Int active)
     return at;
 }
 
-inline Int are_outside(const Path *path, Int i, Int j)
-{
-    return i < 0 || i >= path->u.lists || j < 0 || j >= path->v.lists;
-}
-
-// Pass by stacks of cells, and parts of stacks, whose slabs ahead are empty (section 4), for the
-// rays that look. In a loop of its own, so that rays meet again behind it.
-inline void skip_empty_cells(Cursor *at, Int looks, const Path *path, const Sense *sense,
-                             const Grid *grid)
-{
-    const Axis *u = &path->u, *v = &path->v;
-    while (ANY(looks)) {
-        // Is the cell empty? Which is the nearest that is not, in this stack?
-        const Int stack = (at->j >> STACK_SHIFT) * grid->stacks_wide + (at->i >> STACK_SHIFT);
-        const Words mask = words_at(grid->masks, SELECT((Int)(0), stack, looks));
-        Int nearest, nothing;
-        const Int passes = look_ahead(&nearest, &nothing, mask.low, mask.high, sense, at->depth,
-                                      looks, grid, path->ray.depths);
-        if (!ANY(passes))
-            break;
-        // Jump to it, or to the stack's border
-        const Int edge_i = stack_edge(u, at->i), edge_j = stack_edge(v, at->j);
-        const Real r_border = fmin(crossings(u, edge_i), crossings(v, edge_j));
-        const Real r_until = empty_until(r_border, nearest, nothing, sense, grid, path->ray.depths);
-        const Int i = index_reached(u, at->i, edge_i, r_until);
-        const Int j = index_reached(v, at->j, edge_j, r_until);
-        const Int moves = passes && (i != at->i || j != at->j);
-        const Real r = r_entered(v, r_entered(u, at->r, at->i, i), at->j, j);
-        at->r = SELECT(at->r, r, moves);
-        at->depth = SELECT(at->depth, depth_at(sense, r), moves);
-        search_again(&at->search, moves);
-        const Int ends = r_until >= path->ray.r_begin + 1.0f || are_outside(path, i, j);
-        looks = passes && !ends && ((i ^ at->i) | (j ^ at->j)) >> STACK_SHIFT != 0;
-        at->i = SELECT(at->i, i, passes);
-        at->j = SELECT(at->j, j, passes);
-        at->active = at->active && !(passes && ends);
-    }
-}
-
 // What a turn has found out.
 typedef struct {
     ListMet list;
@@ -181,8 +142,8 @@ inline void step_on(Cursor *at, const Crossing *crossing, const Path *path, Int 
     const Int in_u = crossing->r_u <= crossing->r_v;
     const Int i = at->i + SELECT((Int)(0), path->u.step, leaves && in_u);
     const Int j = at->j + SELECT((Int)(0), path->v.step, leaves && !in_u);
-    const Int ends =
-        crossing->r_next >= path->ray.r_begin + 1.0f || done || are_outside(path, i, j);
+    const Int ends = crossing->r_next >= path->ray.r_begin + 1.0f || done ||
+                     are_outside(&path->u, &path->v, i, j);
     at->active = at->active && !(leaves && ends);
     at->new_stack = at->new_stack || ((i ^ at->i) | (j ^ at->j)) >> STACK_SHIFT != 0;
     at->i = i;
@@ -199,7 +160,10 @@ __attribute__((always_inline)) inline void follow_in_sense(Made *made, const Pat
     for (int turn = 0; ANY(at.active); ++turn) {
         // Skip cells of the occupancy grid that no supersegment reaches (section 4)
         if (grid->masks && turn % TURNS_PER_LOOK == 0 && ANY(at.new_stack && at.active)) {
-            skip_empty_cells(&at, at.new_stack && at.active, path, &sense, grid);
+            const Int moved = skip_empty_cells(
+                &at.i, &at.j, &at.r, &at.depth, &at.active, at.new_stack && at.active, &path->u,
+                &path->v, &sense, grid, path->ray.r_begin + 1.0f, path->ray.depths);
+            search_again(&at.search, moved);
             at.new_stack = 0;
             if (!ANY(at.active))
                 break;

@@ -147,8 +147,8 @@ _GROUPS["table"] = f"{_GROUPS['look']} transfer_function"
 
 _VDI = "a .vdi file, a series, .vdis, a set, .vdiset, an .exr deep image, or a page, .html"
 _VOLUME = (
-    "a file (.nii.gz, .nrrd, .mha, .tif, .h5, .vti, .npy, ...), a folder of DICOM "
-    "slices, or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
+    "a file (.nii.gz, .nrrd, .mha, .tif, .h5, .vti, .npy, ...), a folder of slices "
+    "(DICOM, TIFF, PNG), or a store of chunks (.ome.zarr, .zarr, x.h5::/path)"
 )
 _STEPS = "; several are time steps, step_2 before step_10, and so are those of a store"
 #: What is read, by names for it: of which some may be a volume that is known by its name.

@@ -190,8 +190,9 @@ class Classification(Look, ArrayChoice):
         given = {*self.given} & {*Look.declared, *IN_PLACE} - {"interpolation"}
         if given:
             raise InvalidArgumentError(
-                "classification='deferred' keeps values, whatever their look, and no gradients to "
-                f"shade by: give {', '.join(sorted(given))} to classified() of what is returned"
+                f"classification='deferred' keeps values, whatever their look: give "
+                f"{', '.join(sorted(given))} to classified() of what is returned, where all but "
+                "shade can be had, which needs gradients"
             )
 
     def transfer_function_of(self, volume: Volume) -> TransferFunction:

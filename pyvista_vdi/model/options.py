@@ -397,11 +397,11 @@ class QualityTarget(Options):
     )
 
     def __post_init__(self) -> None:
-        if self.quality is not None and self.target_ssim is not None:
-            raise InvalidArgumentError(
-                f"quality={self.quality!r} and target_ssim={self.target_ssim!r} both say how good "
-                "pictures are to be: give one of them"
-            )
+        given = self.given
+        free = len(given) > 1 and self.quality == "reference"  # made without a choice
+        if free or given.keys() >= {"quality", "target_ssim"}:
+            said = " and ".join(f"{name}={value!r}" for name, value in given.items())
+            raise InvalidArgumentError(f"{said} each say how good pictures are: give one of them")
         super().__post_init__()
 
     @property

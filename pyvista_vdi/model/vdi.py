@@ -28,7 +28,7 @@ _LENS = ("view_angle", "use_horizontal_view_angle", "parallel_scale", "window_ce
 
 #: What has arrays that are made when they are asked for, by its ``arrays()``: lists on the device
 #: that made them (``generation/list_arrays.py``), 8-byte supersegments (``model/packing.py``), or
-#: values and a transfer function (``model/classify_values.py``).
+#: values and a transfer function (``model/deferred.py``).
 LateArrays = Any
 
 
@@ -310,14 +310,13 @@ def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> N
     if given.size == 0:
         given = np.zeros((0, *item), dtype)
     whole = given.dtype.kind == "u" or (given.dtype.kind == "i" and given.min() >= 0)
-    if given.dtype.kind not in "uif" or (dtype is np.uint64 and not whole):
-        kind = "whole numbers >= 0" if dtype is np.uint64 else "numbers"
+    fits = whole if dtype is np.uint64 else given.dtype.kind in "uif"
+    if not fits or given.ndim != 1 + len(item) or given.shape[1:] != item:
+        wanted = "whole numbers >= 0" if dtype is np.uint64 else "numbers"
         raise InvalidVDIError(
-            f"{name} must be {kind}, in an array; got {reprlib.repr(values)}, of {given.dtype}"
+            f"{name} must be {wanted}, in an array of shape {'(n, 3)' if item else '(n,)'}; got "
+            f"{reprlib.repr(values)}, {given.dtype} of shape {given.shape}"
         )
-    if given.ndim != 1 + len(item) or given.shape[1:] != item:
-        wanted = f"(n, {item[0]})" if item else "(n,)"
-        raise InvalidVDIError(f"{name} must have shape {wanted}; got {given.shape}")
     with np.errstate(over="ignore"):  # infinite then: a rule refuses it, and says where
         return np.ascontiguousarray(given, dtype=dtype)
 
@@ -337,28 +336,14 @@ def _check(arrays: Arrays, size: tuple[int, int], nearest: float, depth_origin: 
     ``nearest`` is the least front that is before the eye.
     """
     offsets, front, back, color, tau = arrays
-    # Check that the lists' offsets and the arrays' lengths fit together
     (width, height), n = size, len(front)
-    if len(offsets) != width * height + 1:
+    lengths = dict(zip(Arrays._fields[1:], map(len, arrays[1:]), strict=True))
+    ends = len(offsets) == width * height + 1 and offsets[0] == 0 and offsets[-1] == n
+    if not ends or (offsets[1:] < offsets[:-1]).any() or {*lengths.values()} != {n}:
         raise InvalidVDIError(
-            f"offsets must have W * H + 1 = {width * height + 1} entries for {width} x {height} "
-            f"lists; got {len(offsets)}"
-        )
-    if offsets[0] != 0:
-        raise InvalidVDIError(f"offsets[0] must be 0; got {offsets[0]}")
-    falls = offsets[1:] < offsets[:-1]
-    if falls.any():
-        i = int(np.argmax(falls))
-        raise InvalidVDIError(
-            f"offsets must not decrease; offsets[{i}] = {offsets[i]} is followed by "
-            f"{offsets[i + 1]}"
-        )
-    if {offsets[-1], *map(len, arrays[1:])} != {n}:
-        lengths = zip(Arrays._fields[1:], arrays[1:], strict=True)
-        raise InvalidVDIError(
-            f"offsets[-1] = {offsets[-1]} supersegments, but "
-            f"{', '.join(f'{name} has {len(array)}' for name, array in lengths)} "
-            "entries: give each as many"
+            f"offsets must be W * H + 1 = {width * height + 1} numbers that never decrease, from 0 "
+            f"to the number of supersegments, which every other array has; got {len(offsets)}, "
+            f"{offsets}, and lengths {lengths}"
         )
     # Check each supersegment. Comparisons are written so that NaN fails them
     ordered = np.ones(n, dtype=bool)

@@ -223,7 +223,7 @@ def added(plotter: Any, volume: Any, asked: Addition) -> Any:
     thing = shown.thing if several is None else several
     if isinstance(thing, VDISource):
         mapper.SetInputConnection(thing.GetOutputPort())
-        mapper.driver.input.of_scene = True
+        thing.of_scene = True
     else:
         mapper.SetInputData(thing)
         if shown.prop is not None:  # which classifies what keeps values

@@ -148,7 +148,7 @@ def test_an_error_that_is_kept_keeps_no_bricks(runtime, used, scene, monkeypatch
     assert runtime.allocated == before
 
 
-@pytest.mark.parametrize("limit", [1, "900 KiB"])
+@pytest.mark.parametrize("limit", [1, 900 * 2**10])
 def test_too_little_even_for_one_brick(runtime, scene, limit):
     volume, camera, function = scene
     message = (

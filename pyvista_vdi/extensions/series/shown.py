@@ -56,11 +56,6 @@ class SeveralInput(Input):
         self._unsaid: list[Exception] = []  # why they are
         self._worker = BackgroundThread(thread)
 
-    def classified_by(self, prop: Any) -> Input:
-        """Set the property that classifies the values of all VDIs from now on."""
-        self.prop = prop
-        return self
-
     def on_devices(self) -> list[Any]:
         """Return the VDIs that are ready, and what was classified of that which is shown."""
         with self._lock:
@@ -136,7 +131,6 @@ class SeriesInput(SeveralInput):
         #: Steps per second, and whether one is shown after the other.
         self.rate, self.playing = RATE, False
         self._clock, self._loop = clock, True
-        self._changed: Callable[..., Any] | None = None  # tells the mapper that it plays
         # Places go on where the series begins anew: place p is step p modulo the steps
         self._place = self._from = 0
         self._since: float | None = None  # when the place before was due; None before a frame
@@ -195,19 +189,9 @@ class SeriesInput(SeveralInput):
         """Return the step, and the time stamp of what classifies it."""
         return self.step, self.prop and (id(self.prop), self.prop.GetMTime())
 
-    def shared(self) -> Input:
-        """Return an input that shows the same step, and plays by itself."""
-        other = SeriesInput(self.collection)
-        other.step, other.prop = self.step, self.prop
-        return other
-
     def look(self, camera: Camera, device: Any) -> None:
         """Read for a device."""
         self.device = device
-
-    def watch(self, changed: Callable[..., Any] | None) -> None:
-        """Call this when it begins to play; ``None`` ends it."""
-        self._changed = changed
 
     def play(
         self, rate: float = RATE, *, loop: bool = True, memory_limit: int | None = None
@@ -227,8 +211,7 @@ class SeriesInput(SeveralInput):
         last = len(self.collection) - 1
         self._begin(0 if not loop and self.step == last else self.step)
         self.playing = last > 0
-        if self._changed is not None:
-            self._changed()
+        self.tell()
 
     def pause(self) -> None:
         """Stay at the step that is shown."""

@@ -6,6 +6,7 @@ normal, the cross product of the directions of columns and rows.
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Callable
 from functools import lru_cache
@@ -46,13 +47,28 @@ def dicom(path: Path) -> list[VolumeInFile]:
                     found.append(_volume(path, those, name))
             except Exception as error:  # of ours, or of what decodes pixels
                 wrong.append(error)
+    if not series and not wrong and path.is_dir():
+        found = _pictures(path)
     if not found:
-        none = f"{path} holds no slices of DICOM, or one: give the folder of them all"
+        none = f"{path} holds no slices of DICOM, PNG or TIFF, or one: give the folder of them all"
         raise wrong[-1] if wrong else InvalidVolumeError(none)
     if wrong:
         left_out = f"{len(wrong)} files or series in the folder {path} are left out"
         warn_external(f"{left_out}; the first: {wrong[0]}")
     return found
+
+
+def _pictures(folder: Path) -> list[VolumeInFile]:
+    """Return PNG and TIFF pictures as slices along z, the 10th after the 9th; top rows are last."""
+    from skimage.io import imread
+
+    files = [each for each in folder.iterdir() if each.suffix.lower() in (".png", ".tif", ".tiff")]
+    if len(files) < 2:
+        return []
+    files.sort(key=lambda file: re.sub(r"\d+", lambda number: number[0].zfill(24), file.name))
+    first = imread(files[0])
+    shape, whole = (len(files), *first.shape), lambda: np.stack([*map(imread, files)])[:, ::-1]
+    return [VolumeInFile(Lazy(shape, first.dtype, whole), "zyxs"[: len(shape)])]
 
 
 def _slices(file: Path) -> list[Any]:

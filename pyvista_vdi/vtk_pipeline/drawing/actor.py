@@ -12,7 +12,7 @@ from pyvista_vdi.raycasting.picking import Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refuse
 from pyvista_vdi.vtk_pipeline.drawing.screen import place_image, show_image
-from pyvista_vdi.vtk_pipeline.filters.inputs import input_of
+from pyvista_vdi.vtk_pipeline.filters.source import input_of
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import (
@@ -66,8 +66,6 @@ class VDIActorMethods:
     def SetProperty(self: Any, prop: Any) -> None:
         """Set the volume property, from which the VDI is regenerated.
 
-        What is shared with a copy of this actor is not changed for the other.
-
         Parameters
         ----------
         prop : vtkVolumeProperty
@@ -80,37 +78,11 @@ class VDIActorMethods:
         """
         mapper = self.GetMapper()
         source = None if mapper is None else mapper.GetSource()
-        if source is not None and prop is not source.GetVolumeProperty():
-            mapper.own_source("its property").SetVolumeProperty(prop)
-        elif mapper is not None and (shown := mapper.driver.input) is not None:
-            mine = shown.classified_by(prop)
-            if mine is not shown:
-                mapper.SetInputData(mine)
+        if source is not None:
+            source.SetVolumeProperty(prop)
+        elif mapper is not None and mapper.driver.input is not None:
+            mapper.driver.input.prop = prop
         super().SetProperty(prop)  # type: ignore[misc]
-
-    def ShallowCopy(self: Any, other: Any) -> None:
-        """Show what another actor shows, by a copy of its mapper, which is of one actor.
-
-        Place, property and visibility are VTK's to copy: the property is shared.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it has an ordinary volume mapper.
-        """
-        mapper = other.GetMapper() if hasattr(other, "GetMapper") else None
-        copied = mapper
-        if isinstance(mapper, VDIMapperMethods):
-            copied = mapper.NewInstance()
-            copied.ShallowCopy(mapper)
-        self.SetMapper(copied)  # which refuses VTK's
-        super().ShallowCopy(other)  # type: ignore[misc]
-        self._become_vdi_actor()  # VTK has it share the other one's shader
-        self.SetMapper(copied)
-
-    def NewInstance(self) -> VDIActorMethods:
-        """Return another actor of this class, with nothing to show yet."""
-        return type(self)()
 
     @property
     def vdi(self: Any) -> VDI | None:
@@ -245,16 +217,16 @@ class VDIActorMethods:
         driver.failed = ()
         driver.said.clear()
         matrix = as_array(self.GetMatrix())
-        renderer, shown = driver.renderer(), driver.input
-        shown.note_scene(driver.renderers, matrix)
+        renderer = driver.renderer()
+        source.note_scene(driver.renderers, matrix)
         if camera is not None:
             source.SetCamera(camera, matrix)
         elif renderer is not None:
-            shown.take_camera(self.camera_to_come(renderer), matrix)
+            source.take_camera(self.camera_to_come(renderer), matrix)
         if window_size is not None:
             source.SetWindowSize(window_size)
         elif renderer is not None and min(renderer.GetSize()) > 0:
-            shown.take_size(size_of(renderer))
+            source.take_size(size_of(renderer))
         return source.GetVDI()  # type: ignore[no-any-return]
 
     def camera_to_come(self, renderer: Any) -> Any:

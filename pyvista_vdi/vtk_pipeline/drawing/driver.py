@@ -30,7 +30,8 @@ from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Drawn, raycast
 from pyvista_vdi.vtk_pipeline.drawing.overlap import group_of
 from pyvista_vdi.vtk_pipeline.drawing.planner import Planner
 from pyvista_vdi.vtk_pipeline.drawing.screen import ImageTexture, NoDepth, place_image
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.filters.source import VDISource
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.interaction.timer import PERIOD, Timer
 from pyvista_vdi.vtk_pipeline.interaction.window import Window, now
@@ -63,22 +64,19 @@ class Driver(Planner):
 
     def set_input(self, source: Input | None) -> None:
         """Draw another VDI, and show its bounds to VTK at once."""
-        weak = weakref.ref(self)
-
-        def changed(*_: Any) -> None:
-            driver = weak()
-            if driver is not None:
-                driver.box.connect()
-                driver.follow()
-
         if self.input is not None:
-            self.input.watch(None)
+            self.input.drivers.discard(self)
             self.input.rest()
         self.input, self._last, self.failed = source, NOTHING, ()
         self.forget()
         if source is not None:
-            source.watch(changed)
+            source.drivers.add(self)
         self.box.show(source)
+
+    def changed(self) -> None:
+        """Look at what is before the input, which may be another by now, or play."""
+        self.box.connect()
+        self.follow()
 
     def release(self) -> None:
         """Free textures, images and what devices hold, and end what goes on; a frame begins anew.
@@ -88,7 +86,7 @@ class Driver(Planner):
         held = [] if self.input is None else self.input.on_devices()
         if self._volume is not None:
             held.append(self._volume.request.volume)
-        if isinstance(self.input, SourceInput):
+        if isinstance(self.input, VDISource):
             self.input.keep_lights(self.renderers)
         self._timer.stop()
         if self.input is not None:
@@ -108,8 +106,7 @@ class Driver(Planner):
         actor, renderer = self.actor(), self.renderer()
         if renderer is None or not _is_drawing(renderer):
             self.warn(
-                "VDIMapper draws only behind its own VDIActor: use VDIActor in place of vtkVolume, "
-                "also for copies (VDIActor().ShallowCopy(actor))"
+                "VDIMapper draws only behind its own VDIActor: use VDIActor in place of vtkVolume"
             )
             return
         # VTK asks for four where the actor's property says that they are dependent

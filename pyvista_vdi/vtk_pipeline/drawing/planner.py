@@ -38,8 +38,8 @@ from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, consumers, planes_of
 from pyvista_vdi.vtk_pipeline.drawing.images import VolumePicture
 from pyvista_vdi.vtk_pipeline.drawing.overlap import group_of
 from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput
-from pyvista_vdi.vtk_pipeline.filters.source import Request
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, size_of
 from pyvista_vdi.vtk_pipeline.interaction.window import now
 
@@ -112,7 +112,7 @@ class Planner:
             return None
         source.note_scene(renderers, frame.model_transform)
         source.set_view_if_missing(*frame.seen_from)
-        if not isinstance(source, SourceInput):
+        if not isinstance(source, VDISource):
             return self._stored(source, frame)
         # What is drawn in several views is out of date in none of them by itself
         one_view = len(renderers) == 1 and source.alone
@@ -175,7 +175,7 @@ class Planner:
         full = not frame.window.previews(self.settings)
         return frame.showing(vdi, full=full, parts=tuple(parts) if blended else ())
 
-    def _look(self, source: SourceInput, frame: Frame, *, joint: bool, one_view: bool) -> Seen:
+    def _look(self, source: VDISource, frame: Frame, *, joint: bool, one_view: bool) -> Seen:
         """Look at all that decides what the frame shows."""
         window, settings, view = frame.window, self.settings, frame.view
         watched = one_view and window.watched_behind(settings)
@@ -183,7 +183,7 @@ class Planner:
         if self._wanted is None or self._wanted[0] != stamp or self._wanted[1] is None:
             request, trouble = None, None
             try:
-                request = source.source.MakeRequest(None if watched or source.has_view else view)
+                request = source.MakeRequest(None if watched or source.has_view else view)
             except (Cancelled, InvalidVolumeError):
                 raise
             except Exception as error:  # what is shown can still be drawn
@@ -204,7 +204,7 @@ class Planner:
         if watched and trouble is not None and stamp != self._stamp and source.last() is not None:
             self._complain(trouble)
         self._stamp = stamp
-        vdi, made_of = source.last(), source.source.GetCurrentRequest()
+        vdi, made_of = source.last(), source.made_of
         known = vdi is not None and made_of is not None
         content, volume, late, each = None, "whole", False, self.costs.volume
         if wanted is not None:
@@ -219,7 +219,7 @@ class Planner:
             view=view,
             content=content,
             screen=None if wanted is None else wanted.screen,
-            chosen=source.view_is_chosen(wanted, made_of),
+            chosen=source.view_is_chosen(wanted),
             draw=settings.draw,
             regenerate=settings.regenerate,
             bound=settings.regenerate_below,
@@ -259,7 +259,7 @@ class Planner:
 
     # What is planned is done
 
-    def _do(self, planned: Plan, seen: Seen, source: SourceInput, frame: Frame) -> None:
+    def _do(self, planned: Plan, seen: Seen, source: VDISource, frame: Frame) -> None:
         """Begin, or give up, what goes on in the background, and make what a frame waits for."""
         if planned.give_up:
             self.drop()
@@ -267,7 +267,7 @@ class Planner:
             source.follow_if_changed(*frame.seen_from)
         if planned.make is not None:
             try:
-                request = source.source.MakeRequest(planned.make)
+                request = source.MakeRequest(planned.make)
             except Exception as error:  # what is shown can still be drawn
                 self._fail(error)
             else:
@@ -280,9 +280,9 @@ class Planner:
         if planned.update:
             self._update(source)
 
-    def _estimate(self, source: SourceInput, view: View) -> None:
+    def _estimate(self, source: VDISource, view: View) -> None:
         """Estimate, in the background, the error of the VDI in a view."""
-        vdi, of, mapper = source.last(), source.source.GetCurrentRequest(), self.actor().GetMapper()
+        vdi, of, mapper = source.last(), source.made_of, self.actor().GetMapper()
         assert vdi is not None and of is not None  # noqa: PT018
         request, made = of, vdi
         planes = np.reshape(planes_of(mapper), (-1, 6))
@@ -299,9 +299,7 @@ class Planner:
         self._asked = request
         self.worker.put(Job(judge, request.device))
 
-    def _shown(
-        self, planned: Plan, source: SourceInput, frame: Frame
-    ) -> VDI | VolumePicture | None:
+    def _shown(self, planned: Plan, source: VDISource, frame: Frame) -> VDI | VolumePicture | None:
         """Return what a plan shows, made where it has to be; VDIError is raised if it cannot be."""
         assert self._wanted is not None
         _, wanted, trouble = self._wanted
@@ -311,24 +309,17 @@ class Planner:
             assert trouble is not None
             raise trouble
         if planned.show == "exact":
-            return self._of_this_view(source, frame)
+            return source.exact_vdi(frame.view)
         if self._volume is None or self._volume.request.content != planned.content:
             self._volume = None  # its buffers go before others are taken
-            request = source.source.GetCurrentRequest()
+            request = source.made_of
             if request is None or request.content != planned.content:
                 request = wanted
             if planned.in_bricks:  # for pictures of that size
-                request = source.source.MakeRequest(frame.view)
+                request = source.MakeRequest(frame.view)
             assert request is not None
             self._volume = VolumePicture(request, in_bricks=planned.in_bricks)
         return self._volume
-
-    def _of_this_view(self, source: SourceInput, frame: Frame) -> VDI:
-        """Make and return a VDI of exactly the frame's view."""
-        wanted = source.exact_request(frame.view)
-        vdi = source.source.MakeVDI(wanted)
-        source.source.TakeVDI(vdi, wanted)
-        return vdi
 
     def _update(self, source: Input) -> None:
         """Make the VDI of the source now; what fails is not repeated until something changes."""
@@ -388,8 +379,8 @@ class Planner:
         if isinstance(made, ViewEstimate):
             self.estimate = made
             return True
-        assert isinstance(self.input, SourceInput)
-        self.input.source.TakeVDI(made, request)
+        assert isinstance(self.input, VDISource)
+        self.input.TakeVDI(made, request)
         self.estimate = None
         if self.settings.draw == "vdi":
             self._volume = None
@@ -415,7 +406,7 @@ class Planner:
         picture, of the view that this would have now. ``None`` without an input, or a view.
         """
         source, seen = self.input, self._look_for_view()
-        if not isinstance(source, SourceInput):
+        if not isinstance(source, VDISource):
             if source is None or (source.last() is not None and source.prop is None):
                 return None if source is None else source.last()
             return source.vdi()  # in the colours that its property has by now
@@ -427,16 +418,16 @@ class Planner:
                 if source.stamp() not in self.failed:
                     self._update(source)
         elif seen is not None:
-            return source.source.UpdateFromInput(source.view_for(*seen))
+            return source.vdi(source.view_for(*seen))
         return source.last()
 
     def vdi_to_pick(self, frame: Frame) -> VDI | None:
         """Return a VDI that has all of what a view shows; without a volume, the one there is."""
         vdi, view = self.vdi_asked_for(), frame.view
-        if vdi is None or not isinstance(self.input, SourceInput):
+        if vdi is None or not isinstance(self.input, VDISource):
             return vdi
         whole = coverage(vdi, view.camera, view.size) == 1
-        return vdi if whole else self._of_this_view(self.input, frame)
+        return vdi if whole else self.input.exact_vdi(view)
 
     def values_asked_for(self) -> DeferredVDI | None:
         """Return the values that are classified, made now if they are not.
@@ -456,7 +447,7 @@ class Planner:
         if not renderers:
             return None
         seen = actor.camera_to_come(renderers[0]), size_of(renderers[0]), matrix
-        if isinstance(source, SourceInput):
+        if isinstance(source, VDISource):
             return seen
         source.set_view_if_missing(*seen)
         if source.last() is None:

@@ -191,7 +191,7 @@ def test_what_an_earlier_run_wrote_is_kept_or_continued(tmp_path, scene):
             ("x.vdis", (8, 8, 8), {"clim": (0, 1), "every": every}, InvalidArgumentError, "every")
             for every in (0, "often")
         ),
-        ("x.vdis", (8, 8), {"clim": (0, 1)}, InvalidArgumentError, "three whole numbers"),
+        ("x.vdis", (8, 8), {"clim": (0, 1)}, InvalidArgumentError, "dimensions must be 3"),
         ("x.vdis", (8, 8, 8), {"clim": (0, 1), "colour": "red"}, TypeError, "colour"),
         (
             "x.vdis",
