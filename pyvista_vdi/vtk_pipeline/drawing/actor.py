@@ -150,7 +150,8 @@ class VDIActorMethods:
 
     @opacity_multiplier.setter
     def opacity_multiplier(self: Any, multiplier: float) -> None:
-        self.GetMapper().SetOpacityMultiplier(multiplier)
+        if self._driver is not None:  # else it raises
+            self.GetMapper().SetOpacityMultiplier(multiplier)
 
     def pick(
         self: Any, x: float, y: float, opacity_threshold: float = DEFAULT_OPACITY
