@@ -8,8 +8,7 @@
 // so that no step is taken
 //               twice or left out; less the part's first point, which rounds nothing, they are
 //               sampled
-// -D VOXEL_T, INDEX_T, COMPONENTS, NEAREST: see volume/sampling.cl; SHADED, GRADIENT_OPACITY: see
-// volume/shading.cl
+// -D VOXEL_T, INDEX_T, COMPONENTS, NEAREST: see volume/sampling.cl; SHADED: see volume/shading.cl
 #include "lib/transpose.cl"
 #include "lib/classification.cl"
 #include "volume/sampling.cl"
@@ -36,7 +35,7 @@ typedef struct {
     __global const uchar *distances; // of the macrocells from visible ones, see
                                      // volume/macrocells.cl; 0: nothing is empty
     __global const uchar *blanked;   // see is_blank; 0: nothing is
-    __global const float *gradient;  // see gradient_opacity
+    __global const float *gradient;  // see gradient_opacity; 0: opacity does not depend on it
     __global const float *lighting;  // see lit
     __global const float *ambient;   // see ambient_factor; 0: there is none
 } Medium;
@@ -139,16 +138,16 @@ inline Real4 medium_at(const Medium *medium, Real x, Real y, Real z, Real units)
         sample.w =
             SELECT(sample.w, (Real)(0.0f), is_blank(medium->blanked, of->points.size, x, y, z));
     const Int visible = sample.w > 0.0f;
-    if (!(COMPONENTS > 1 || SHADED || GRADIENT_OPACITY || medium->ambient) || !ANY(visible))
+    if (!(COMPONENTS > 1 || SHADED || medium->gradient || medium->ambient) || !ANY(visible))
         return sample;
     Real3 color = REAL3(sample.x, sample.y, sample.z);
     if (COMPONENTS > 1)
         color = sample_color(medium->voxels, &of->points, at_x, at_y, at_z);
 
     // Shade it
-    if (SHADED || GRADIENT_OPACITY) {
+    if (SHADED || medium->gradient) {
         const Real3 differences = scalar_differences(medium->voxels, &of->points, at_x, at_y, at_z);
-        if (GRADIENT_OPACITY) {
+        if (medium->gradient) {
             const Real scaled =
                 scaled_optical_depth(sample.w, gradient_opacity(differences, medium->gradient));
             sample.w = SELECT(sample.w, scaled, visible);

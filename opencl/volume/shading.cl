@@ -1,9 +1,8 @@
 // Shading and gradient opacity, as VTK's GPU volume mapper computes them (docs/dev/conventions.md,
 // "Lighting").
 //
-// -D SHADED            0: samples are not lit; 1: they are; 2: by one headlight and nothing else,
-// which VTK shades its own way -D GRADIENT_OPACITY  1: opacity depends on how fast the scalar
-// changes
+// -D SHADED  0: samples are not lit; 1: they are; 2: by one headlight and nothing else, which VTK
+// shades its own way
 //
 // Lights are in a frame of their own, "the lights' frame", whose origin is the eye: the model
 // frame's axes for a headlight, the view's otherwise.

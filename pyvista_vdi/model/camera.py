@@ -134,17 +134,9 @@ class Camera:
             matrix = camera.GetModelTransformMatrix()
             elements = [matrix.GetElement(k // 4, k % 4) for k in range(16)]
             model_transform = np.reshape(elements, (4, 4))
-        return cls(
-            camera.GetPosition(),
-            camera.GetFocalPoint(),
-            camera.GetViewUp(),
-            view_angle=camera.GetViewAngle(),
-            parallel_projection=camera.GetParallelProjection(),
-            parallel_scale=camera.GetParallelScale(),
-            window_center=camera.GetWindowCenter(),
-            use_horizontal_view_angle=camera.GetUseHorizontalViewAngle(),
-            model_transform=model_transform,
-        )
+        names = [each.name for each in fields(cls) if each.init and each.name != "model_transform"]
+        known = {name: getattr(camera, f"Get{name.title().replace('_', '')}")() for name in names}
+        return cls(**known, model_transform=model_transform)
 
     @classmethod
     def from_dict(cls, state: Mapping[str, Any]) -> Camera:

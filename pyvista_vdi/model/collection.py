@@ -63,9 +63,9 @@ class VDICollection(Sequence[VDI]):
         """Write all in one file that `pyvista_vdi.read` opens, or a page, whole or not at all.
 
         The target's name ends in ``.vdis`` for a series, in ``.vdiset`` for a set, or in ``.html``.
-        The options are those of :meth:`VDI.save`; ``precision`` is by default a series' first
-        step's, else ``"8-byte"``. Pages have ``title`` and ``background`` as well, and those of a
-        series ``autoplay``.
+        The options are those of :meth:`VDI.save`; supersegments take 8 bytes by default, those of
+        a series what its first step's take. Pages have ``title`` and ``background`` as well, and
+        those of a series ``autoplay``.
         """
         method = registry.method(f"{type(self).__name__}.save")
         return method(self, path, **options)  # type: ignore[no-any-return]

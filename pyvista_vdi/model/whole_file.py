@@ -70,7 +70,7 @@ def _begun(path: str | os.PathLike[str]) -> tuple[Path, Path, BinaryIO]:
         if target.exists() and not target.is_file():
             raise OSError(0, "it is a folder, or not a regular file")
         if not target.parent.is_dir():
-            raise OSError(0, f"the folder {target.parent} does not exist; create it")
+            raise OSError(0, f"the folder {target.parent} does not exist (create it)")
         # Shortened: the temporary name may not be longer than the folder's file system allows
         temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
         return target, temporary, temporary.open("x+b")

@@ -136,7 +136,7 @@ class Variant:
     OpenCL's types of a voxel's component (``voxel``) and of a voxel's address (``index``); a
     scalar, or colours and a scalar (1 or 4 ``components``); whether the ``nearest`` point is
     sampled, and the medium of its scalar looked up (``by_scalar``). Samples are not lit, lit, or
-    lit by one headlight and nothing else (``shaded`` 0, 1, 2); opacity may depend on the gradient;
+    lit by one headlight and nothing else (``shaded`` 0, 1, 2);
     voxels may be ``part`` of a grid. With ``double_float``, rays enter the volume so far from where
     they are formed that float32 does not hold it. ``compensated``: how sums along a ray are kept
     (``lib/compositing.cl``). ``sharp``, no ``-D`` option: a specular power is so large that cosines
@@ -149,7 +149,6 @@ class Variant:
     nearest: bool = False
     by_scalar: bool = False
     shaded: int = 0
-    gradient_opacity: bool = False
     part: bool = False
     double_float: bool = False
     compensated: int = 0
@@ -165,7 +164,6 @@ class Variant:
             "NEAREST": self.nearest,
             "BY_SCALAR": self.by_scalar,
             "SHADED": self.shaded,
-            "GRADIENT_OPACITY": self.gradient_opacity,
             "GRID_PART": self.part,
             "DOUBLE_FLOAT_RAYS": self.double_float,
             "COMPENSATED": self.compensated,

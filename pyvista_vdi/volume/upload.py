@@ -364,7 +364,6 @@ def shading_variant(transfer_function: TransferFunction, lights: Lights) -> dict
     return {
         "shaded": 0 if shading is None else 2 if lights.headlight_only else 1,
         "sharp": shading is not None and shading.specular_power > LARGEST_POWER,
-        "gradient_opacity": transfer_function.gradient_opacities is not None,
     }
 
 

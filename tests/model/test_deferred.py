@@ -14,7 +14,7 @@ from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
 )
-from pyvista_vdi.model.deferred import lengths_of
+from pyvista_vdi.model.vdi import lengths_of
 
 LOOKS = TransferFunction([[1, 0, 0], [0, 1, 0], [0, 0, 1]], [0, 0.8, 0.3], (100, 300))
 

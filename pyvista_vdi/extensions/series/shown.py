@@ -14,10 +14,9 @@ from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float, as_whole
 from pyvista_vdi.model.collection import RATE
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.options import MediumOptions
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.quality.background import BackgroundThread, Job
 from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input

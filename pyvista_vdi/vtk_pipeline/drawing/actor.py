@@ -6,8 +6,7 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit, Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refuse
@@ -151,7 +150,8 @@ class VDIActorMethods:
 
     @opacity_multiplier.setter
     def opacity_multiplier(self: Any, multiplier: float) -> None:
-        self.GetMapper().SetOpacityMultiplier(multiplier)
+        if self._driver is not None:  # else it raises
+            self.GetMapper().SetOpacityMultiplier(multiplier)
 
     def pick(
         self: Any, x: float, y: float, opacity_threshold: float = DEFAULT_OPACITY

@@ -24,9 +24,8 @@ from pyvista_vdi.errors import (
     VDIWarning,
     warn_external,
 )
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import FrameRequest, RenderOptions
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.view import View, coverage
 from pyvista_vdi.quality.background import BackgroundThread, Job, vdi_job
 from pyvista_vdi.quality.costs import Costs

@@ -97,8 +97,6 @@ _VIEWPORT = "vdiViewport"
 #: what begins at the near plane, and so lies before all that is translucent, as without peeling.
 LOOKUP = f"""//VTK::System::Dec
 //VTK::Output::Dec
-in vec3 ip_textureCoords;
-in vec3 ip_vertexPos;
 vec4 g_fragColor = vec4(0.0);
 uniform sampler2D vdiImage;
 uniform float in_scale;
@@ -130,6 +128,7 @@ void finalizeRayCast()
   //VTK::Picking::Exit
   g_fragColor.rgb = g_fragColor.rgb * in_scale + in_bias * g_fragColor.a;
   gl_FragData[0] = g_fragColor;
+  gl_FragData[1] = gl_FragData[2] = vec4(0.0);  // SSAO's place and normal stay
 }}
 
 void main()

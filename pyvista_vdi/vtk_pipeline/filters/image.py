@@ -11,9 +11,8 @@ import numpy as np
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.model.checks import Number
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import FrameRequest
-from pyvista_vdi.model.vdi import VDI, picture_view
+from pyvista_vdi.model.vdi import VDI, DeferredVDI, picture_view
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (

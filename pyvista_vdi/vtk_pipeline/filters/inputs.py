@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.vtk_pipeline.filters.algorithm import wanted_time
 from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image

@@ -22,7 +22,6 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import one_of
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import (
@@ -32,7 +31,7 @@ from pyvista_vdi.model.options import (
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import LightsLike
-from pyvista_vdi.model.vdi import VDI, screen_metadata
+from pyvista_vdi.model.vdi import VDI, DeferredVDI, screen_metadata
 from pyvista_vdi.model.view import bounds_corners, covering_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.targets import generate_to_target, warn_missed
