@@ -489,7 +489,11 @@ class Driver:
             assert trouble is not None
             raise trouble
         if planned.show == "exact":
-            return source.exact_vdi(frame.view)
+            if frame.full_size == frame.view.size:
+                return source.exact_vdi(frame.view)
+            # A tile of a screenshot is of that picture alone
+            request = source.MakeRequest(frame.view)
+            return source.MakeVDI(request.seen_from(frame.view.camera, frame.full_size))
         if self._volume is None or self._volume.request.content != planned.content:
             self._volume = None  # its buffers go before others are taken
             request = source.made_of
