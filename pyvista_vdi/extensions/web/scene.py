@@ -31,12 +31,11 @@ from pyvista_vdi.extensions.web.shown import (
     png,
     viewer_camera,
 )
-from pyvista_vdi.model.view import View
 from pyvista_vdi.model.whole_file import whole_file
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.frame import planes_of
-from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, size_of
+from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, camera_of, size_of
 
 #: What VTK draws in the same place whatever the view.
 _FIXED = ("vtkTextActor", "vtkCornerAnnotation", "vtkScalarBarActor", "vtkLegendBoxActor")
