@@ -18,7 +18,7 @@ from pyvista_vdi.plotting import registration
 _HOMES = {
     "AmbientOcclusion": "model.ambient_occlusion",
     "Camera": "model.camera",
-    "DeferredVDI": "model.deferred",
+    "DeferredVDI": "model.vdi",
     "Cropping": "model.cropping",
     "Light": "model.lighting",
     "Lights": "model.lighting",

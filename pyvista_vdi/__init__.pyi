@@ -23,7 +23,6 @@ from pyvista_vdi.io.volumes import read_volume as read_volume
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion as AmbientOcclusion
 from pyvista_vdi.model.camera import Camera as Camera
 from pyvista_vdi.model.cropping import Cropping as Cropping
-from pyvista_vdi.model.deferred import DeferredVDI as DeferredVDI
 from pyvista_vdi.model.lighting import Light as Light
 from pyvista_vdi.model.lighting import Lights as Lights
 from pyvista_vdi.model.lighting import Shading as Shading
@@ -31,6 +30,7 @@ from pyvista_vdi.model.metrics import compare_images as compare_images
 from pyvista_vdi.model.presets import presets as presets
 from pyvista_vdi.model.transfer_function import TransferFunction as TransferFunction
 from pyvista_vdi.model.vdi import VDI as VDI
+from pyvista_vdi.model.vdi import DeferredVDI as DeferredVDI
 from pyvista_vdi.model.volume import Volume as Volume
 from pyvista_vdi.raycasting.picking import Pick as Pick
 from pyvista_vdi.vtk_pipeline import VDIActor as VDIActor

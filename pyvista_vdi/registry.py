@@ -30,7 +30,7 @@ class FileFormat:
     compressions: tuple[str, ...] = ()  # the first by default; without any neither is an option
     head: str = ""  # of a folder or ZIP of VDIs its file that is last in a folder, first in a ZIP
     page: bool = False  # may hold another's file: module has begins_with and data_in
-    values: bool = False  # holds deferred VDIs as well
+    values: bool = False  # holds VDIs that keep values as well
     needs: str = ""  # what its module cannot be loaded without, and the command that installs it
 
     def load(self) -> Any:

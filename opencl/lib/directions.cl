@@ -23,7 +23,7 @@ inline Real affine_with(__global const float *row, Real x, Real y, Real z)
     return (row[0] * x + row[1] * y) + (row[2] * z + row[3]);
 }
 
-// Of one, drivers have ways of their own: Intel's sums up squares in double precision.
+// Of one, drivers have ways of their own: Intel's sums up squares in double.
 inline Real length_of(Real3 v)
 {
     if (VECTOR_FUNCTIONS) {

@@ -3,7 +3,7 @@
 //
 // u and v are pixels of V_O's window from its centre. The depth coordinate z grows with depth:
 //
-//     -D DEPTH=RECIPROCAL   z = -1 / Z            the same relative precision at every depth
+//     -D DEPTH=RECIPROCAL   z = -1 / Z            as many digits at every depth
 //     -D DEPTH=SHIFTED      z = (Z - Z_ref) / Z   long lens: what cancels in Z - Z_ref was taken
 //                                                 out in float64 by the host
 //     -D DEPTH=PARALLEL     z = Z - Z_ref         1 / Z is not needed

@@ -1,4 +1,4 @@
-// Values to media: what a transfer function makes of a supersegment of a deferred VDI
+// Values to media: what a transfer function makes of a supersegment that keeps values
 // (docs/dev/conventions.md, "Values in place of colours").
 #pragma OPENCL FP_CONTRACT OFF
 

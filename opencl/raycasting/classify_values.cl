@@ -1,4 +1,4 @@
-// A deferred VDI's values to the arrays of a classified one (lib/values.cl).
+// Values that a VDI keeps to the arrays of a classified one (lib/values.cl).
 #include "lib/values.cl"
 #pragma OPENCL FP_CONTRACT OFF
 

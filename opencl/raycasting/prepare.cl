@@ -31,8 +31,8 @@ inline float prepared_extinction(float front, float back, float optical_depth, f
 }
 
 #if !PACKED
-// One work-item per bundle of lists. Of a deferred VDI's values, to which a transfer function is
-// applied, what is transparent is left out: the rest moves up.
+// One work-item per bundle of lists. Of values, to which a transfer function is applied, what is
+// transparent is left out: the rest moves up.
 __attribute__((vec_type_hint(float16))) __kernel void prepare_lists(
     __global const ulong *starts, // of the lists in the arrays, width * height + 1
     __global const ulong *places, // headers of the bundles with all supersegments

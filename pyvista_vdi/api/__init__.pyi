@@ -7,14 +7,13 @@ import os
 from collections.abc import (Sequence)
 from numpy.typing import (ArrayLike, NDArray)
 from pyvista_vdi.model.collection import (VDICollection)
-from pyvista_vdi.model.deferred import (DeferredVDI)
 from pyvista_vdi.model.transfer_function import (TransferFunction)
 from pyvista_vdi.model.types import (
     CameraLike, ClientLike, ColorMapLike, Coverage, Criterion, CroppingLike, DeviceLike,
     Interpolation, LightsLike, OcclusionLike, OpacityLike, Precision, Preference, Progress, Quality,
     RangeLike, ScalarsLike, ShownLike, VTKObject, VolumeLike, WindowSize,
 )
-from pyvista_vdi.model.vdi import (VDI)
+from pyvista_vdi.model.vdi import (DeferredVDI, VDI)
 from pyvista_vdi.raycasting.picking import (Pick)
 from typing import (Any, Literal, overload)
 

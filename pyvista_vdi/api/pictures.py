@@ -15,11 +15,10 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag
 from pyvista_vdi.model.classification import IN_PLACE, Classification
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi, as_volume
 from pyvista_vdi.model.options import FrameRequest, MediumOptions, RenderOptions, SceneOptions
 from pyvista_vdi.model.types import CameraLike, DeviceLike, ShownLike, VolumeLike, WindowSize
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
 
 if TYPE_CHECKING:

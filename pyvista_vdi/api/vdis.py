@@ -14,7 +14,6 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, warn_exter
 from pyvista_vdi.model.arguments import refuse_unknown, takes
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import (
     Deferral,
@@ -31,7 +30,7 @@ from pyvista_vdi.model.types import (
     VolumeLike,
     WindowSize,
 )
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.view import nearest_depth
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 

@@ -16,7 +16,7 @@ from pyvista_vdi.errors import InvalidArgumentError, NoDeviceError, VDIError
 
 PROBE_COUNT, PROBE_GROUP = 256, 32
 # OpenCL 1.2 allows expm1 and exp 3 ulp, log1p 2 ulp (section 7.4); one ulp is at most 2^-23 of the
-# value; the fourth is for the reference, which is rounded to single precision nowhere.
+# value; the fourth is for the reference, which is rounded to float32 nowhere.
 PROBE_RTOL = 4 * 2.0**-23
 
 _lock = threading.RLock()
@@ -100,14 +100,11 @@ def describe_devices() -> str:
     """
     infos, variable = list_devices(), devices.DEVICE_VARIABLE
     selector, best = os.environ.get(variable, "").strip(), None
+    why = f"because {variable}={selector!r}" if selector else "GPUs first, then Intel's CPU runtime"
     try:
         best = get_runtime().info
-        last = f"Default: {best.full_name}" + (
-            f", because {variable}={selector!r}."
-            if selector
-            else "; GPUs come first, then CPUs, Intel's before PoCL.\n"
-            f"Choose another with device=, --device or {variable}."
-        )
+        last = f"Default: {best.full_name}, {why}."
+        last += f"\nChoose another with device=, --device or {variable}."
     except NoDeviceError as error:
         last = f"No default: {error}."
     lines = [
@@ -155,8 +152,5 @@ def run_probe(runtime: Runtime) -> str:
     fused = exact * exact - (x * x)  # exact in float64: 48 bits
     expected = np.stack([np.expm1(-exact), np.log1p(-exact), np.exp(-exact), fused], axis=1)
     right = np.allclose(computed, expected, rtol=PROBE_RTOL, atol=0)
-    return (
-        ""
-        if right and whole[0] == len(x) * (len(x) + 1) // 2
-        else "the probe kernel computes wrong numbers"
-    )
+    right = right and whole[0] == len(x) * (len(x) + 1) // 2
+    return "" if right else "the probe kernel computes wrong numbers"

@@ -49,7 +49,7 @@ def definitions() -> list[str]:
 
 
 def literal(value: object) -> str:
-    """Return a value as OpenCL C has it: floats in exact single precision, booleans as 0 or 1."""
+    """Return a value as OpenCL C has it: floats as exact float32, booleans as 0 or 1."""
     if isinstance(value, (bool, np.bool_)):
         return str(int(value))
     if isinstance(value, (float, np.floating)):

@@ -4,10 +4,12 @@ Everything here but :func:`find_devices` works on plain :class:`DeviceInfo` list
 driver.
 """
 
+import atexit
 import contextlib
 import ctypes
 import importlib.metadata
 import os
+import shutil
 import sys
 import tempfile
 import threading
@@ -193,6 +195,10 @@ def _import_pyopencl() -> ModuleType:
         writable_cache("pytools", "pytools")  # for the Python code that it makes for kernels
     except OSError:
         cl._PYOPENCL_NO_CACHE = True
+        with contextlib.suppress(OSError):  # PoCL has no device without a folder of its own
+            if not os.environ.get("POCL_CACHE_DIR"):
+                os.environ["POCL_CACHE_DIR"] = own = tempfile.mkdtemp(prefix="pyvista-vdi-pocl-")
+                atexit.register(shutil.rmtree, own, ignore_errors=True)
     return cl
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.checks import as_range
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import (
     Deferral,
     GenerationOptions,
@@ -17,7 +16,7 @@ from pyvista_vdi.model.options import (
     record,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import lengths_of, made_vdi
+from pyvista_vdi.model.vdi import DeferredVDI, lengths_of, made_vdi
 from pyvista_vdi.model.volume import Volume
 
 #: Optical depth of a voxel's length of what is kept: so little that float32 sums it up as a length,

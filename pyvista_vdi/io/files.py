@@ -13,9 +13,8 @@ from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file.chunks import check_level
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.checks import one_of
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import PRECISIONS
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.whole_file import as_path, check_writable, with_suffix
 from pyvista_vdi.registry import FileFormat
 

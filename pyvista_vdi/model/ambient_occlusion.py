@@ -70,11 +70,7 @@ class AmbientOcclusion:
 
     @classmethod
     def from_any(cls, value: Any) -> AmbientOcclusion | None:
-        """Return what a user calls ambient occlusion; ``None`` where there is none.
-
-        ``None`` and ``False`` are none, ``True`` is the default, a number is a radius.
-        InvalidArgumentError if it is none of these.
-        """
+        """Return what a user calls ambient occlusion: True, a radius; None where there is none."""
         if value is None or value is False:
             return None
         if isinstance(value, int | float | np.number):
@@ -144,11 +140,9 @@ class OcclusionGrid:
 
 
 def spread_directions(n: int) -> NDArray[np.float64]:
-    """Return n unit vectors spread evenly over all directions, float64 (n, 3); always the same.
+    """Return n unit vectors spread evenly, float64 (n, 3): a spherical Fibonacci lattice.
 
-    A spherical Fibonacci lattice: bands of equal area, from one to the next turned by the golden
-    angle (R. Swinbank, R. J. Purser, "Fibonacci grids", Quarterly Journal of the Royal
-    Meteorological Society 132(619), 2006).
+    R. Swinbank, R. J. Purser, "Fibonacci grids", Q. J. R. Meteorol. Soc. 132(619), 2006.
     """
     i = np.arange(n)
     z = 1 - (2 * i + 1) / n

@@ -101,7 +101,6 @@ def takes(
     aliases: Mapping[str, str] | None = None,
     returns: Mapping[str, Any] | None = None,
     kinds: Mapping[str, str] | None = None,
-    flat: bool = False,
     **records: Any,
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Make the options of records the arguments of a function, which gets the records.
@@ -111,14 +110,14 @@ def takes(
     of that order; and its docstring an entry for each that it does not describe itself.
     ``aliases`` are other names that are taken as well. ``returns``: what the function returns, by
     the values of an option; ``kinds``: types of options that are others than declared. What is
-    seldom turned is taken as ``settings``, or where that is to be ``flat`` like the others.
+    seldom turned is taken as ``settings``.
     """
     options: dict[str, Option] = {}
     for each in records.values():
         options |= each.declared
     for name, kind in (kinds or {}).items():
         options[name] = replace(options[name], kind=kind)
-    hidden = {name: told for name, told in options.items() if told.setting and not flat}
+    hidden = {name for name, told in options.items() if told.setting}
     shown = {name: told for name, told in options.items() if name not in hidden}
     if hidden:
         what = f"options that are seldom turned; here {', '.join(sorted(hidden))}"
@@ -142,7 +141,7 @@ def takes(
             except TypeError as error:
                 raise TypeError(f"{called_by}() {error}") from None
             given |= zip(named, args, strict=False)
-            made = records_of(given, called_by, *records.values(), flat=flat)
+            made = records_of(given, called_by, *records.values())
             return function(**given, **dict(zip(records, made, strict=True)))
 
         text = _documented(function.__doc__ or "", shown.values())
@@ -179,12 +178,10 @@ def records_of(
     function: str,
     *records: Any,
     defaults: Mapping[str, Any] | None = None,
-    flat: bool = False,
 ) -> list[Any]:
     """Return records of the options that a function was given, which are taken out of ``given``.
 
-    ``settings``, where they are among it, say some of them, which are taken by themselves only
-    where they are to be ``flat``; ``defaults`` are others than declared.
+    ``settings``, where they are among it, say some of them; ``defaults`` are others than declared.
     """
     settings = given.pop("settings", None)
     if not isinstance(settings, Settings | None):
@@ -202,7 +199,7 @@ def records_of(
     for each in records:
         found = {}
         for name, told in each.declared.items():
-            if name in given and (flat or not told.setting):
+            if name in given and not told.setting:
                 found[name] = given.pop(name)
             elif name in said:
                 found[name] = said[name]

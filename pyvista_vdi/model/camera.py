@@ -27,11 +27,7 @@ _VECTORS = {"position": 3, "focal_point": 3, "view_up": 3, "window_center": 2}
 
 
 def check_window_size(window_size: Sequence[int], *, name: str = "window_size") -> tuple[int, int]:
-    """Return width and height in pixels as two Python ints; ``name`` is for errors.
-
-    Raises InvalidArgumentError if they are not two whole numbers between 1 and
-    :data:`MAX_WINDOW_EDGE`.
-    """
+    """Return width and height in pixels as two Python ints; ``name`` is for errors."""
     try:
         width, height = window_size
         size = (int(width), int(height))
@@ -109,10 +105,7 @@ class Camera:
         """Return what a user calls a camera as a :class:`Camera`.
 
         It is a Camera, a ``vtkCamera`` or PyVista's, which are read through their ``Get…`` methods,
-        or position, focal point and view up. ``model_transform`` replaces that of a Camera or a
-        ``vtkCamera``, and is the identity by default where there is none. InvalidCameraError if it
-        is no camera, UnsupportedError if it has a view shear, an explicit or off-axis projection or
-        a user transform, for which the optical model has no place.
+        or position, focal point and view up. ``model_transform`` replaces what it has.
         """
         if isinstance(camera, Camera):
             given = model_transform is not None
@@ -141,17 +134,9 @@ class Camera:
             matrix = camera.GetModelTransformMatrix()
             elements = [matrix.GetElement(k // 4, k % 4) for k in range(16)]
             model_transform = np.reshape(elements, (4, 4))
-        return cls(
-            camera.GetPosition(),
-            camera.GetFocalPoint(),
-            camera.GetViewUp(),
-            view_angle=camera.GetViewAngle(),
-            parallel_projection=camera.GetParallelProjection(),
-            parallel_scale=camera.GetParallelScale(),
-            window_center=camera.GetWindowCenter(),
-            use_horizontal_view_angle=camera.GetUseHorizontalViewAngle(),
-            model_transform=model_transform,
-        )
+        names = [each.name for each in fields(cls) if each.init and each.name != "model_transform"]
+        known = {name: getattr(camera, f"Get{name.title().replace('_', '')}")() for name in names}
+        return cls(**known, model_transform=model_transform)
 
     @classmethod
     def from_dict(cls, state: Mapping[str, Any]) -> Camera:
@@ -170,26 +155,7 @@ class Camera:
         """Return the view of the model frame as a PyVista camera: ``plotter.camera = ...``.
 
         An actor whose matrix is the identity is seen as the model transform placed it: where this
-        is rigid by an eye that has moved instead, else by the camera's own model transform. Needs
-        PyVista.
-
-        Returns
-        -------
-        pyvista.Camera
-            The same picture.
-
-        Raises
-        ------
-        MissingDependencyError
-            If PyVista is not installed.
-
-        Examples
-        --------
-        >>> import pyvista as pv
-        >>> import pyvista_vdi as pvdi
-        >>> plotter = pv.Plotter(off_screen=True)
-        >>> plotter.camera = pvdi.Camera((0, -4, 1), (0, 0, 0), (0, 0, 1)).to_pyvista()
-        >>> plotter.close()
+        is rigid by an eye that has moved instead, else by the camera's own model transform.
         """
         return registry.method("Camera.to_pyvista")(self)
 
@@ -213,11 +179,8 @@ class Camera:
     ) -> Camera:
         """Return the view that a rectangle of pixels of a window has.
 
-        A picture of ``tile_size`` by the new view is the part ``picture[row : row + height,
-        column : column + width]`` of this view's picture of ``window_size``: its rays are the
-        same to rounding. ``corner``: column and row of the tile's first pixel, from the top left;
-        the tile may reach beyond the window. InvalidArgumentError if the sizes are not two whole
-        numbers of pixels each.
+        ``corner``: column and row of the tile's first pixel, from the top left; the tile may reach
+        beyond the window. Its rays are the same to rounding.
         """
         window = np.array(check_window_size(window_size))
         tile = np.array(check_window_size(tile_size, name="tile_size"))

@@ -36,10 +36,7 @@ def as_whole(value: Any) -> float:
 
 
 def as_flag(value: Any, name: str) -> bool:
-    """Return what is true or false as a bool.
-
-    Raises InvalidArgumentTypeError if it is anything else than a truth value, a number or ``None``.
-    """
+    """Return a truth value, a number or ``None`` as a bool; InvalidArgumentTypeError for others."""
     if isinstance(value, bool | np.bool_ | int | float | np.number | None):
         return bool(value)
     raise InvalidArgumentTypeError(f"{name} must be True or False; got {value!r}")
@@ -74,10 +71,7 @@ class Number:
 
 
 def one_of(value: Any, name: str, names: Sequence[str], none: bool = False) -> Any:
-    """Return a text that is one of some, or None where ``none`` is true.
-
-    Raises InvalidArgumentError if it is not.
-    """
+    """Return a text that is one of some, or None where ``none`` is true."""
     if (isinstance(value, str) and value in names) or (none and value is None):
         return value
     error = InvalidArgumentError if isinstance(value, str) else InvalidArgumentTypeError
@@ -89,10 +83,10 @@ def one_of(value: Any, name: str, names: Sequence[str], none: bool = False) -> A
     raise error(f"{name} must be {known}; got {value!r}{hint}")
 
 
-def check_callback(function: Any, name: str = "progress") -> None:
-    """Raise InvalidArgumentTypeError if something is neither a function nor ``None``."""
+def check_callback(function: Any) -> None:
+    """Raise InvalidArgumentTypeError if ``progress`` is neither a function nor ``None``."""
     if function is not None and not callable(function):
-        raise InvalidArgumentTypeError(f"{name} must be a function; got {function!r}")
+        raise InvalidArgumentTypeError(f"progress must be a function; got {function!r}")
 
 
 def as_range(values: Any) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from importlib.util import find_spec
@@ -59,25 +58,9 @@ def _composite(mode: Any) -> str:
     )
 
 
-class Described(Options):
-    """Options of which metadata tell those that are given."""
-
-    def describe(self) -> dict[str, Any]:
-        """Return what differs from the defaults; what JSON cannot hold as a short description."""
-        found = {}
-        for name, given in self.given.items():
-            value = given.to_dict() if isinstance(given, TransferFunction) else given
-            value = value.tolist() if hasattr(value, "tolist") else value
-            try:
-                found[name] = json.loads(json.dumps(value, allow_nan=False))
-            except (TypeError, ValueError):
-                found[name] = getattr(value, "name", None) or type(value).__name__
-        return found
-
-
 @record
 @dataclass(frozen=True, eq=False)
-class ArrayChoice(Described):
+class ArrayChoice(Options):
     """``add_volume``'s arguments that say which scalars are seen, and how along a ray."""
 
     scalars: ScalarsLike | None = option(
@@ -99,7 +82,7 @@ class ArrayChoice(Described):
 
 @record
 @dataclass(frozen=True, eq=False)
-class Look(Described):
+class Look(Options):
     """``add_volume``'s arguments that say what a scalar looks like, with its names and defaults.
 
     ``interpolation``, which ``add_volume`` leaves at VTK's default, is one of them. What is not
@@ -151,11 +134,7 @@ class Look(Described):
 @record
 @dataclass(frozen=True, eq=False)
 class Classification(Look, ArrayChoice):
-    """The classification arguments of one call, checked.
-
-    InvalidArgumentError if ``transfer_function`` or ``volume_property`` is mixed with arguments
-    that it replaces, or a value cannot be used.
-    """
+    """The classification arguments of one call, checked."""
 
     volume_property: VTKObject | None = option(None, "in place of the others, as it is")
     transfer_function: TransferFunction | None = option(
@@ -178,9 +157,7 @@ class Classification(Look, ArrayChoice):
     ) -> Classification:
         """Return the classification of a VDI by arguments that a function was given.
 
-        ``others`` are the function's other keyword arguments: a TypeError for an unknown name
-        suggests the nearest one. InvalidArgumentError or UnsupportedError if a value cannot be
-        used.
+        ``others`` are the function's other keyword arguments, for a TypeError that suggests one.
         """
         refuse_unknown(given, function, (*declared(Classification), *others))
         return cls(**given)
@@ -190,17 +167,13 @@ class Classification(Look, ArrayChoice):
         given = {*self.given} & {*Look.declared, *IN_PLACE} - {"interpolation"}
         if given:
             raise InvalidArgumentError(
-                "classification='deferred' keeps values, whatever their look, and no gradients to "
-                f"shade by: give {', '.join(sorted(given))} to classified() of what is returned"
+                f"classification='deferred' keeps values, whatever their look: give "
+                f"{', '.join(sorted(given))} to classified() of what is returned, where all but "
+                "shade can be had, which needs gradients"
             )
 
     def transfer_function_of(self, volume: Volume) -> TransferFunction:
-        """Return the transfer function that the arguments describe for a volume.
-
-        InvalidArgumentError if a colour map, an opacity or another value is not one that
-        ``add_volume`` takes, MissingDependencyError if PyVista is needed to build it and not
-        installed.
-        """
+        """Return the transfer function that the arguments describe for a volume."""
         table: Any = self.transfer_function
         if isinstance(table, TransferFunction):
             return table

@@ -49,25 +49,9 @@ class VDICollection(Sequence[VDI]):
     def classified(self: _Collection, **look: Any) -> _Collection:
         """Return it with the colours that a transfer function makes of the values that it keeps.
 
-        Parameters
-        ----------
-        **look
-            As for :meth:`DeferredVDI.classified`; what is not given follows from the range of the
-            first VDI's values, so that a colour stands for the same value in all of them.
-
-        Returns
-        -------
-        VDISeries or VDISet
-            Of ordinary VDIs, each of which is made when it is asked for.
-
-        Raises
-        ------
-        InvalidVDIError
-            If its VDIs have colours.
-
-        See Also
-        --------
-        DeferredVDI.classified : has the other errors, and the warning.
+        The look is as for :meth:`DeferredVDI.classified`; what is not given follows from the range
+        of the first VDI's values, so that a colour stands for the same value in all of them. Each
+        VDI is made when it is asked for. InvalidVDIError if they have colours.
         """
         return registry.method("DeferredVDI.classified")(self, look)  # type: ignore[no-any-return]
 
@@ -76,32 +60,12 @@ class VDICollection(Sequence[VDI]):
         raise NotImplementedError
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write all in one file, or a page that shows it, whole or not at all.
+        """Write all in one file that `pyvista_vdi.read` opens, or a page, whole or not at all.
 
-        :func:`pyvista_vdi.read` opens both.
-
-        Parameters
-        ----------
-        path : path-like
-            The target; its name ends in ``.vdis`` for a series, in ``.vdiset`` for a set, or in
-            ``.html``.
-        **options
-            ``precision`` (by default a series' first step's, and else ``"8-byte"``),
-            ``compression`` (``"zstd"``, and ``"deflate"`` in a page) and ``level`` as for
-            :meth:`VDI.save`; ``progress``, called with the finished fraction. For pages ``title``
-            and ``background`` as well, and of a series ``autoplay``.
-
-        Returns
-        -------
-        pathlib.Path
-            The file.
-
-        Raises
-        ------
-        VDIFileError
-            If the target cannot be written.
-        InvalidArgumentError
-            If an option is out of its range, or one is a look, which :meth:`classified` takes.
+        The target's name ends in ``.vdis`` for a series, in ``.vdiset`` for a set, or in ``.html``.
+        The options are those of :meth:`VDI.save`; supersegments take 8 bytes by default, those of
+        a series what its first step's take. Pages have ``title`` and ``background`` as well, and
+        those of a series ``autoplay``.
         """
         method = registry.method(f"{type(self).__name__}.save")
         return method(self, path, **options)  # type: ignore[no-any-return]

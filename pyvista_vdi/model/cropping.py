@@ -90,9 +90,8 @@ class Cropping:
     def from_any(cls, cropping: Any) -> Cropping | None:
         """Return what a user calls cropping; ``None`` where nothing is cropped.
 
-        It is None, a Cropping, the planes of a sub-volume, six numbers, or a pair of planes and
-        regions, or a mapper, whose cropping may be off, and has the planes as VTK's GPU mapper cuts
-        the image at its input. InvalidArgumentError if it is none of these.
+        A mapper's cropping may be off, and has the planes as VTK's GPU mapper cuts the image at its
+        input.
         """
         if cropping is None or isinstance(cropping, Cropping):
             return cropping

@@ -14,10 +14,7 @@ HOST_ALIGNMENT = 4096
 
 
 def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Return an uninitialised C-contiguous array that a CPU device can use without a copy.
-
-    Its data begin at a multiple of 4096 bytes.
-    """
+    """Return an uninitialised C-contiguous array that a CPU device can use without a copy."""
     shape = (shape,) if isinstance(shape, int) else tuple(shape)
     nbytes = math.prod(shape) * np.dtype(dtype).itemsize
     raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)

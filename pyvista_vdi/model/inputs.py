@@ -14,18 +14,15 @@ from pyvista_vdi.errors import (
     InvalidVolumeError,
     InvalidVolumeTypeError,
 )
-from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.volume import Volume
 
 
 def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Volume:
     """Return what a user calls a volume as a :class:`Volume`; VTK is imported for its own only.
 
-    It is a Volume, a file as :func:`read_volume` reads it, an image of VTK's or PyVista's, or what
-    an extension makes one of. ``scalars`` are the name of the array, the active one by default, or
-    values per point; ``preference`` says which array is meant where points and cells have one of
-    that name. InvalidVolumeError if it is none of these, or has no such scalars.
+    ``scalars`` are the name of the array, the active one by default, or values per point;
+    ``preference`` says which array is meant where points and cells have one of that name.
     """
     if isinstance(volume, str | os.PathLike):
         array = scalars if isinstance(scalars, str) else None

@@ -111,20 +111,12 @@ class Light:
             )
         of_camera = "camera" if light.LightTypeIsCameraLight() else "scene"
         kind = "headlight" if light.LightTypeIsHeadlight() else of_camera
-        follows = kind != "scene"  # its matrix is what VTK last made of the camera
-        return cls(
-            kind,
-            light.GetPosition() if follows else light.GetTransformedPosition(),
-            light.GetFocalPoint() if follows else light.GetTransformedFocalPoint(),
-            light.GetAmbientColor(),
-            light.GetDiffuseColor(),
-            light.GetSpecularColor(),
-            bool(light.GetPositional()),
-            light.GetAttenuationValues(),
-            light.GetConeAngle(),
-            light.GetExponent(),
-            light.GetIntensity(),
-        )
+        # The matrix of one that follows the camera is what VTK last made of the camera
+        own = "Transformed" if kind == "scene" else ""
+        names = [f"{own}Position", f"{own}FocalPoint"]
+        names += ["AmbientColor", "DiffuseColor", "SpecularColor"]
+        names += ["Positional", "AttenuationValues", "ConeAngle", "Exponent", "Intensity"]
+        return cls(kind, *(getattr(light, f"Get{name}")() for name in names))
 
     def in_world(self, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return position and unit direction of travel in world coordinates, float64 (3,) each."""
@@ -161,8 +153,7 @@ class Lights:
         """Return what a user calls lights.
 
         ``None`` is one headlight. Of a renderer, the lights that are switched on are taken as they
-        are now, and a headlight where none is on, which is what VTK would make; else it is Lights,
-        or an iterable of Light or ``vtkLight``. InvalidArgumentError if it is something else.
+        are now, and a headlight where none is on, which is what VTK would make.
         """
         if lights is None:
             return cls()
@@ -170,9 +161,8 @@ class Lights:
             return lights
         if hasattr(lights, "GetTwoSidedLighting"):
             on = tuple(Light.from_any(each) for each in lights.GetLights() if each.GetSwitch())
-            if not on and lights.GetAutomaticLightCreation():
-                return cls(two_sided=bool(lights.GetTwoSidedLighting()))
-            return cls(on, bool(lights.GetTwoSidedLighting()))
+            made = (Light(),) if not on and lights.GetAutomaticLightCreation() else on
+            return cls(made, bool(lights.GetTwoSidedLighting()))
         if not np.iterable(lights) or isinstance(lights, str | Mapping):
             raise InvalidArgumentError(
                 "lights must be Light or vtkLight objects, or the renderer whose lights are "

@@ -54,12 +54,7 @@ class Comparison:
 def over_background(
     image: ArrayLike, background: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> NDArray[np.float64]:
-    """Blend a premultiplied image over a background.
-
-    ``image`` (float, shape (H, W, 4) or (H, W, 3)): premultiplied RGBA, or RGB, which has nothing
-    to blend. ``background``: RGB, 0 to 1. Returns: float64 (H, W, 3), clipped to 0..1. Raises
-    InvalidArgumentError if it is not such an image, or not finite.
-    """
+    """Blend premultiplied RGBA, or RGB, over a background: float64 (H, W, 3), clipped to 0..1."""
     try:
         pixels = np.asarray(image)
     except ValueError:  # lists of different lengths

@@ -8,11 +8,12 @@ of the command line, Set and Get of VTK's filters, and ParaView's properties.
 
 from __future__ import annotations
 
+import json
 import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cache, partial
+from functools import partial
 from typing import Any, ClassVar, Literal, TypeAlias, TypeVar, get_args, get_origin
 
 import numpy as np
@@ -38,7 +39,6 @@ from pyvista_vdi.model.types import (
     Criterion,
     DeviceLike,
     Draw,
-    Metadata,
     Policy,
     Precision,
     Progress,
@@ -58,10 +58,6 @@ MAX_PREVIEW_SAMPLES = 2**23
 
 #: Origin and normal of each plane; the side that the normal points to is kept.
 Planes: TypeAlias = tuple[tuple[float, ...], ...]
-
-#: What may decide where a list is cut that must be shortened; ``docs/concepts.md`` says what each
-#: means. The first is the default.
-CRITERIA: tuple[Criterion, ...] = get_args(Criterion)
 
 #: The SSIM that a name asks for. "reference" asks for nothing: it is what is made without a target.
 QUALITIES: dict[str, float | None] = {
@@ -85,15 +81,12 @@ RECORDS: list[type[Options]] = []
 
 @dataclass(frozen=True)
 class Option:
-    """An option, as it is declared: an argument's ``name``, its ``default``, ``what`` it means.
+    """An option, as it is declared.
 
-    ``what`` is a sentence that begins small and has no full stop, ``more`` are sentences that
-    documentation has behind it. ``kind`` is the type of the argument, as it is written in Python.
-    ``check`` returns a value as it is kept, or raises InvalidArgumentError; without one a value is
-    one of the choices, a truth value where the default is one, and else whatever is given.
-    ``choices`` are the texts that are taken, where these are all; a ``setting`` is seldom turned,
-    and stands in :class:`Settings`;
-    ``standard`` is the default as it is kept.
+    ``what`` is a sentence that begins small without a full stop, ``more`` those behind it; ``kind``
+    is the argument's type. ``check`` returns a value as it is kept, or raises InvalidArgumentError;
+    without one it is one of the ``choices``, a truth value where the default is one, or anything. A
+    ``setting`` stands in :class:`Settings`; ``standard`` is the default as it is kept.
     """
 
     name: str
@@ -190,6 +183,18 @@ class Options:
                 found[name] = value
         return found
 
+    def describe(self) -> dict[str, Any]:
+        """Return :attr:`given` for metadata; what JSON cannot hold as a short description."""
+        found = {}
+        for name, given in self.given.items():
+            value = given.to_dict() if isinstance(given, TransferFunction) else given
+            value = value.tolist() if hasattr(value, "tolist") else value
+            try:
+                found[name] = json.loads(json.dumps(value, allow_nan=False))
+            except (TypeError, ValueError):
+                found[name] = getattr(value, "name", None) or type(value).__name__
+        return found
+
 
 def record(cls: type[_Record]) -> type[_Record]:
     """Gather the options that a record's fields declare; for classes, above ``@dataclass``."""
@@ -201,24 +206,17 @@ def record(cls: type[_Record]) -> type[_Record]:
 
 def entries(options: Iterable[Option], indent: int = 4) -> str:
     """Return what documentation has of options, as numpydoc's parameters."""
-    return "".join(_entry(o.name, o.kind, o.choices, o.what, o.more, indent) for o in options)
-
-
-@cache
-def _entry(
-    name: str, kind: str, choices: tuple[str, ...], what: str, more: str, indent: int
-) -> str:
-    words = [_WORDS.get(part, part) for part in kind.split(" | ") if part != "None"]
-    if choices:
-        words = ["{" + ", ".join(f'"{each}"' for each in choices) + "}"]
-    optional = ", optional" if "None" in kind else ""
-    margin = " " * (indent + 4)
-    text = f"{what[0].upper()}{what[1:]}. {more}".rstrip()
-    lines = textwrap.wrap(text, 100 - indent - 4, break_long_words=False)
-    return "".join(
-        [f"{margin[4:]}{name} : {' or '.join(words)}{optional}\n"]
-        + [f"{margin}{line}\n" for line in lines]
-    )
+    margin, text = " " * indent, ""
+    for told in options:
+        words = [_WORDS.get(part, part) for part in told.kind.split(" | ") if part != "None"]
+        if told.choices:
+            words = ["{" + ", ".join(f'"{each}"' for each in told.choices) + "}"]
+        optional = ", optional" if "None" in told.kind else ""
+        text += f"{margin}{told.name} : {' or '.join(words)}{optional}\n"
+        said = f"{told.what[0].upper()}{told.what[1:]}. {told.more}".rstrip()
+        lines = textwrap.wrap(said, 100 - indent - 4, break_long_words=False)
+        text += "".join(f"{margin}    {line}\n" for line in lines)
+    return text
 
 
 @record
@@ -397,11 +395,11 @@ class QualityTarget(Options):
     )
 
     def __post_init__(self) -> None:
-        if self.quality is not None and self.target_ssim is not None:
-            raise InvalidArgumentError(
-                f"quality={self.quality!r} and target_ssim={self.target_ssim!r} both say how good "
-                "pictures are to be: give one of them"
-            )
+        given = self.given
+        free = len(given) > 1 and self.quality == "reference"  # made without a choice
+        if free or given.keys() >= {"quality", "target_ssim"}:
+            said = " and ".join(f"{name}={value!r}" for name, value in given.items())
+            raise InvalidArgumentError(f"{said} each say how good pictures are: give one of them")
         super().__post_init__()
 
     @property
@@ -416,11 +414,7 @@ class QualityTarget(Options):
 
 @dataclass(frozen=True, eq=False)
 class GenerationRequest:
-    """A VDI that is asked for: of what, from where, and how; carried whole to what makes it.
-
-    InvalidCameraError or InvalidArgumentError if the camera, the window or ``progress`` cannot be
-    used.
-    """
+    """A VDI that is asked for: of what, from where, and how; carried whole to what makes it."""
 
     volume: Volume
     transfer_function: TransferFunction
@@ -429,7 +423,7 @@ class GenerationRequest:
     options: GenerationOptions = field(default_factory=GenerationOptions)
     device: DeviceLike | None = None
     progress: Progress | None = None  # called between slices of work; False gives it up
-    metadata: Metadata = field(default_factory=dict)  # entries to add to those of the VDI
+    metadata: Mapping[str, Any] = field(default_factory=dict)  # entries to add to those of the VDI
 
     def __post_init__(self) -> None:
         check_callback(self.progress)
@@ -440,10 +434,7 @@ class GenerationRequest:
 
 
 def checked_planes(planes: Any) -> Planes:
-    """Return clipping planes as tuples of six floats; none for ``None``.
-
-    InvalidArgumentError if the shape is another, a value is not finite or a normal is zero.
-    """
+    """Return clipping planes as tuples of six floats; none for ``None``."""
     if planes is None or (np.iterable(planes) and not [*planes]):
         return ()
     table = as_floats(planes)

@@ -131,10 +131,7 @@ class Packed8:
 
 
 def packing_of(arrays: Arrays, nearest: float) -> Packed8:
-    """Return supersegments in 8 bytes each; ``nearest`` is the least depth in front of the eye.
-
-    Raises InvalidArgumentError if a list is too long for that.
-    """
+    """Return supersegments in 8 bytes each; ``nearest`` is the least depth in front of the eye."""
     counts, n = lengths_of_lists(arrays.offsets), len(arrays.front)
     if counts.max() > DEPTH_CODES:
         raise InvalidArgumentError(

@@ -19,7 +19,7 @@ from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_floats
 from pyvista_vdi.model.cropping import Cropping
 from pyvista_vdi.model.host_memory import aligned_empty
-from pyvista_vdi.model.view import bounds_corners
+from pyvista_vdi.model.view import bounds_corners, projected
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -274,20 +274,13 @@ def pixels_of_points(camera: Camera, window_size: tuple[int, int], points: Float
     All of the window, if one of them is not in front of the eye; two pixels more than the points
     reach to otherwise.
     """
-    width, height = window_size
-    whole = Rectangle(0, width, 0, height)
     if not len(points):
         return Rectangle(0, 0, 0, 0)
-    matrix = camera.viewport_matrix(window_size) @ camera.model_to_view
-    x, y, _, d = matrix[:, :3] @ points.T + matrix[:, 3:]
-    if not d.min() > NEAREST_DEPTH * np.abs(d).max():
-        return whole
-    half = np.array([[width / 2], [height / 2]])
-    at = np.stack([x, y]) / d * half + half
-    if not np.isfinite(at).all():
-        return whole
-    low = np.clip(np.floor(at.min(axis=1) - 2), 0, window_size)
-    high = np.clip(np.ceil(at.max(axis=1) + 2), 0, window_size)
+    at = projected(camera, window_size, points)
+    if at is None or not np.isfinite(at).all():
+        return Rectangle(0, window_size[0], 0, window_size[1])
+    low = np.clip(np.floor(at.min(axis=0) - 2), 0, window_size)
+    high = np.clip(np.ceil(at.max(axis=0) + 2), 0, window_size)
     return Rectangle(int(low[0]), int(high[0]), int(low[1]), int(high[1]))
 
 

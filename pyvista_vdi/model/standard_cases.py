@@ -44,12 +44,9 @@ def filling_camera(
 ) -> Camera:
     """Return the perspective view that a box just fills; z is up, world units and degrees.
 
-    The eye looks at the centre of ``bounds`` (x0, x1, y0, y1, z0, z1), and is on the -y side at
-    ``azimuth`` 0, which is counter-clockwise seen from above (VTK's ``Azimuth``); ``elevation`` is
-    above the horizontal plane, less than 90 degrees either way. The distance is the smallest at
-    which all eight corners lie inside the viewport. ``camera.azimuth(5)`` is the view "5 degrees
-    from V_O". InvalidArgumentError if the bounds are not finite or enclose nothing, and
-    InvalidCameraError for angles that make no view.
+    The eye is on the -y side at ``azimuth`` 0, counter-clockwise seen from above (VTK's
+    ``Azimuth``), and ``elevation`` above the horizontal plane, less than 90 degrees either way, as
+    near to the box's centre as all eight corners are inside the viewport.
     """
     width, height = check_window_size(window_size)
     box = np.array(as_bounds(bounds))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.errors import InvalidArgumentError, VDIError
+from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.checks import Number, as_floats, as_range, one_of
 from pyvista_vdi.model.lighting import Shading
 
@@ -118,30 +118,19 @@ class TransferFunction:
 
     def to_dict(self) -> dict[str, Any]:
         """Return what can be written to JSON: the whole table and its range."""
-        state: dict[str, Any] = {}
-        for name, value in vars(self).items():
-            if isinstance(value, np.ndarray):
-                state[name] = value.tolist()
-            elif isinstance(value, Shading):
-                state[name] = asdict(value)
-            elif value is not None or name == "unit_distance":
-                state[name] = list(value) if isinstance(value, tuple) else value
-        return state
+        return {
+            name: asdict(value) if isinstance(value, Shading) else np.asarray(value).tolist()
+            for name, value in vars(self).items()
+            if value is not None or name == "unit_distance"
+        }
 
     @classmethod
     def from_dict(cls, state: dict[str, Any]) -> TransferFunction:
-        """Return the transfer function that :meth:`to_dict` described.
-
-        InvalidArgumentError if it is no such description, or a value is out of range.
-        """
+        """Return the transfer function that :meth:`to_dict` described."""
         try:
-            arguments = dict(state)
-            if arguments.get("shading") is not None:
-                arguments["shading"] = Shading(**arguments["shading"])
-            return cls(**arguments)
-        except (TypeError, ValueError) as error:
-            if isinstance(error, VDIError):
-                raise
+            shading = state.get("shading")
+            return cls(**{**state, "shading": None if shading is None else Shading(**shading)})
+        except (TypeError, AttributeError) as error:
             raise InvalidArgumentError(
                 f"this is no description of a transfer function: {error}"
             ) from error
@@ -158,10 +147,7 @@ class TransferFunction:
     def __repr__(self) -> str:
         return (
             f"TransferFunction({len(self.opacities)} entries over {self.scalar_range}, "
-            f"unit_distance={self.unit_distance}, interpolation={self.interpolation!r}"
-            + ("" if self.shading is None else f", {self.shading}")
-            + ("" if self.gradient_opacities is None else ", with gradient opacity")
-            + ")"
+            f"unit_distance={self.unit_distance}, interpolation={self.interpolation!r})"
         )
 
 

@@ -4,7 +4,7 @@ VTK's and PyVista's objects are told by the methods that they have, so that this
 neither.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, Union
 
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     from pyvista_vdi.model.camera import Camera
     from pyvista_vdi.model.collection import VDICollection
     from pyvista_vdi.model.cropping import Cropping
-    from pyvista_vdi.model.deferred import DeferredVDI
     from pyvista_vdi.model.lighting import Light, Lights
-    from pyvista_vdi.model.vdi import VDI
+    from pyvista_vdi.model.vdi import VDI, DeferredVDI
     from pyvista_vdi.model.volume import Volume
 
 
@@ -71,4 +70,3 @@ Draw: TypeAlias = Literal["auto", "vdi", "volume"]
 When: TypeAlias = Literal["baked", "deferred"]
 #: When a view gets a VDI of its own.
 Policy: TypeAlias = Literal["auto", "never"]
-Metadata: TypeAlias = Mapping[str, Any]

@@ -38,12 +38,10 @@ class View:
     size: tuple[int, int]
 
     def distance(self, other: "View", bounds: tuple[float, ...]) -> float:
-        """Return by how much the corners of a volume's bounds differ between two pictures.
+        """Return the largest distance of a corner's places in two pictures, in half heights.
 
-        Largest distance of a corner's places in the two pictures, each from the picture's centre
-        ray and in its own pixels, over half this picture's height. 0 for the same view; about the
-        angle in radians where an object that fills the picture is turned; infinite where a corner
-        is behind an eye. It sees turning, panning, zooming and resizing alike.
+        About the angle in radians where an object that fills the picture is turned; infinite where
+        a corner is behind an eye.
         """
         if self == other:
             return 0.0
@@ -61,21 +59,12 @@ def covering_view(
     window_size: Sequence[int],
     corners: ArrayLike,
 ) -> tuple[Camera, tuple[int, int]] | None:
-    """Move a view's window so that it covers a volume, and nothing else.
+    """Return a view, and its size, whose window covers the hull of corners, and nothing else.
 
-    Eye, direction and the pixels' size and borders stay as they are on the screen; the window
-    becomes the smallest rectangle of whole pixels of that (unlimited) grid which contains the
-    projected corners. So V_N = V_O hits every list on its centre ray, and neither panning nor
-    zooming out shows a cut edge.
-
-    ``camera``: the view on the screen, with the model transform in it. ``window_size``: the
-    screen's width and height in pixels. ``corners`` (float, shape (n, 3)): points whose convex hull
-    contains the volume, model frame. Where the rectangle would need more lists than
-    :data:`MAX_LISTS_PER_PIXEL` times the window's pixels, they become larger than pixels, square as
-    before, and their borders no longer coincide. Returns: The view with its own window centre and
-    view angle (or parallel scale), and its window size. ``None`` if a corner is behind the eye or
-    closer than a thousandth of the corners' diagonal: no window can cover them. Raises
-    InvalidArgumentError if the window size is out of range.
+    Eye, direction, the pixels' size and their borders stay as they are on the screen, so that
+    V_N = V_O hits every list on its centre ray. Where that took more lists than
+    :data:`MAX_LISTS_PER_PIXEL` times the window's pixels, they become larger. ``None`` where no
+    window can cover the corners: see :func:`projected`.
 
     With t the tangents of the half angles and c the window centre, the pixel rectangle [x0, x1) of
     width w in a window of width W has t' = t w / W and c' t' = t (c + (x0 + x1) / W - 1); the same
@@ -110,13 +99,14 @@ def covering_view(
 
 
 def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
-    """Return the share of a view's rays through the volume that the VDI has all of.
+    """Return the share of a view's rays through the volume that the VDI has all of, 0 to 1.
 
     Below 1 a part of the volume that the view shows lies outside V_O's window, or behind V_O's eye.
 
     ``vdi``: its camera and window say what it has. ``camera``: the new view V_N. ``window_size``:
-    width and height of its picture in pixels. Returns: 0 to 1, of the rays of :func:`_seen`; 1
-    where none of them meets the volume.
+    width and height of its picture in pixels. Returns: 0 to 1, of 33 x 33 rays that reach from edge
+    to edge of the window, and of those through the corners of the bounds; 1 where none of them
+    meets the volume.
 
     V_O's window and what lies before its eye are convex: they contain a part of a ray if they
     contain its two ends.
@@ -125,10 +115,32 @@ def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
     if _in_window(to_lists, bounds_corners(vdi.bounds)).all():  # as with coverage="bounds"
         return 1.0
     camera = Camera.from_any(camera)
-    near, far, _ = _seen(camera, window_size, camera.model_to_view, vdi.bounds)
-    if not len(near):
+    to_view, box = camera.model_to_view, _homogeneous(bounds_corners(vdi.bounds))
+    u, v, _, w = camera.viewport_matrix(window_size) @ to_view @ box
+    before = w > 0
+    across = np.linspace(-1.0, 1.0, _RAYS)
+    corners = np.stack([u[before], v[before]]) / w[before]
+    places = np.hstack([np.stack(np.meshgrid(across, across)).reshape(2, -1), corners])
+    places = places[:, (np.abs(places) <= 1).all(axis=0)]
+    # Points and directions in view space, taken to the model frame
+    to_model = np.linalg.inv(to_view)
+    rays_of = np.vstack([np.ones(places.shape[1]), places]).T
+    origins, directions = (rays_of @ part for part in camera.ray_coefficients(window_size))
+    origins = (to_model @ _homogeneous(origins))[:3]
+    directions = to_model[:3, :3] @ directions.T
+    # The part of each that lies within the bounds, and before the eye
+    low, high = np.reshape(vdi.bounds, (3, 2)).T[:, :, np.newaxis]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.sort(np.stack([low - origins, high - origins]) / directions, axis=0)
+    ends = np.nan_to_num(ends, nan=0.0, posinf=np.inf, neginf=-np.inf)
+    first, last = ends[0].max(axis=0), ends[1].min(axis=0)
+    if not camera.parallel_projection:
+        first = np.maximum(first, 0.0)
+    meets = last > first
+    near, far = (origins[:, meets] + t[meets] * directions[:, meets] for t in (first, last))
+    if not meets.any():
         return 1.0
-    return float((_in_window(to_lists, near) & _in_window(to_lists, far)).mean())
+    return float((_in_window(to_lists, near.T) & _in_window(to_lists, far.T)).mean())
 
 
 def nearest_depth(grid: Grid, camera: Camera, window_size: Sequence[int]) -> float | None:
@@ -136,21 +148,24 @@ def nearest_depth(grid: Grid, camera: Camera, window_size: Sequence[int]) -> flo
 
     World units, 0 where the eye is in the box; ``None`` where nothing of it is in the window.
     """
-    x, y, z = (n - 1 for n in grid.dimensions)
+    from scipy.optimize import linprog  # it has scikit-image's
+
     to_view = camera.model_to_view @ grid.index_to_model
-    depths = _seen(camera, window_size, to_view, (0, x, 0, y, 0, z))[2]
-    return max(0.0, float(depths.min())) if len(depths) else None
+    to_view[:3, :3] *= np.subtract(grid.dimensions, 1)  # the box is [0, 1]³ then
+    u, v, _, w = camera.viewport_matrix(window_size) @ to_view
+    planes = np.stack([w + u, w - u, w + v, w - v])  # of the window, not negative inside
+    planes /= np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+    depth = to_view[2] / np.linalg.norm(to_view[2, :3])
+    found = linprog(depth[:3], -planes[:, :3], planes[:, 3], bounds=(0, 1))
+    return max(0.0, float(to_view[2] @ [*found.x, 1])) if found.success else None
 
 
 def required_level(levels: Sequence[Grid], camera: Camera, window_size: Sequence[int]) -> int:
-    """Return the level of a multi-scale volume that a view requires.
+    """Return which of the levels of a volume, the finest first, a view requires.
 
     It is the coarsest whose voxels are still as fine as half a list's width where the volume is
     nearest to V_O: between the lists, what a finer one has more is hardly seen. Edges of voxels
     count along the axes in which a level is coarser: many stores keep their few planes in all.
-
-    ``levels``: from the finest to the coarsest. ``camera``: V_O. ``window_size``: lists of V_O
-    along x and y.
     """
     depth = nearest_depth(levels[0], camera, window_size)
     if depth is None:  # V_O sees nothing of the volume
@@ -162,40 +177,6 @@ def required_level(levels: Sequence[Grid], camera: Camera, window_size: Sequence
     edges = [np.linalg.norm(to_view @ each.index_to_model[:3, :3], axis=0) for each in levels]
     fine = [now[now > _COARSER * edges[0]].max(initial=0) <= width / 2 for now in edges]
     return fine.index(False) - 1 if False in fine else len(levels) - 1
-
-
-def _seen(
-    camera: Camera, window_size: Sequence[int], to_view: NDArray[np.float64], box: Sequence[float]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return where rays of a view enter and leave a box, float64 (n, 3) each, and the depths first.
-
-    Of 33 x 33 rays that reach from edge to edge of the window, and of those through the corners of
-    the box, those that meet it before the eye. ``to_view`` leads from the box's coordinates to view
-    space.
-    """
-    u, v, _, w = camera.viewport_matrix(window_size) @ to_view @ _homogeneous(bounds_corners(box))
-    before = w > 0
-    across = np.linspace(-1.0, 1.0, _RAYS)
-    corners = np.stack([u[before], v[before]]) / w[before]
-    places = np.hstack([np.stack(np.meshgrid(across, across)).reshape(2, -1), corners])
-    places = places[:, (np.abs(places) <= 1).all(axis=0)]
-    # Points and directions in view space, taken to the box's coordinates
-    to_box = np.linalg.inv(to_view)
-    rays_of = np.vstack([np.ones(places.shape[1]), places]).T
-    origins, directions = (rays_of @ part for part in camera.ray_coefficients(window_size))
-    origins = (to_box @ _homogeneous(origins))[:3]
-    directions = to_box[:3, :3] @ directions.T
-    # The part of each that lies within the box, and before the eye
-    low, high = np.reshape(box, (3, 2)).T[:, :, np.newaxis]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = np.sort(np.stack([low - origins, high - origins]) / directions, axis=0)
-    ends = np.nan_to_num(ends, nan=0.0, posinf=np.inf, neginf=-np.inf)
-    first, last = ends[0].max(axis=0), ends[1].min(axis=0)
-    if not camera.parallel_projection:
-        first = np.maximum(first, 0.0)
-    meets = last > first
-    near, far = (origins[:, meets] + t[meets] * directions[:, meets] for t in (first, last))
-    return near.T, far.T, first[meets]
 
 
 def _in_window(to_window: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError
+from pyvista_vdi.errors import InvalidVolumeError
 from pyvista_vdi.model.checks import as_floats, as_vector
 from pyvista_vdi.model.chunked import ChunkedArray, held, library_of
 from pyvista_vdi.model.host_memory import require_host_memory
@@ -92,9 +91,6 @@ class Volume(Grid):
         Columns are the directions of the x, y and z index axes; identity by default.
     name : str
         What the scalars are called.
-    blanked : numpy.ndarray of uint8, shape (nz, ny, nx), optional
-        What is not drawn: a bit for each octant, half a voxel long, around each point. The
-        octant above the point along x has 1 in its number, that above it along y 2, along z 4.
 
     Raises
     ------
@@ -110,7 +106,9 @@ class Volume(Grid):
     chunked: bool
     #: Of lengths, where a file says it.
     unit: str = ""
-    blanked: NDArray[np.uint8] | None
+    #: What is not drawn, uint8 (nz, ny, nx), of a VTK image: a bit for each octant, half a voxel
+    #: long, around each point. That above the point along x has 1 in its number, y 2, z 4.
+    blanked: NDArray[np.uint8] | None = None
 
     def __init__(
         self,
@@ -120,7 +118,6 @@ class Volume(Grid):
         direction: ArrayLike | None = None,
         *,
         name: str = "values",
-        blanked: NDArray[np.uint8] | None = None,
     ) -> None:
         self.array = _checked_array(array)
         self.chunked = isinstance(self.array, ChunkedArray)
@@ -144,65 +141,19 @@ class Volume(Grid):
             )
         matrix.setflags(write=False)
         self.direction = matrix
-        self.name, self.blanked = str(name), blanked
+        self.name = str(name)
         if min(self.spacing) <= 0:
             raise InvalidVolumeError(
                 f"spacing must be positive along each axis; got {self.spacing}: "
                 "flip the array (or the direction matrix) instead of a negative spacing"
             )
-        if blanked is None:
-            return
-        if self.chunked:
-            raise UnsupportedError(
-                "blanked is of volumes in memory, and this one is read chunk by chunk: load it "
-                "(Volume.load()), or write NaN where it is blank"
-            )
-        kind, shape = getattr(blanked, "dtype", type(blanked)), getattr(blanked, "shape", ())
-        if kind != np.uint8 or shape != self.array.shape[:3]:
-            raise InvalidVolumeError(
-                f"blanked must be uint8 of shape {self.array.shape[:3]}, a bit for each octant; "
-                f"got {kind} of shape {shape}"
-            )
-        self.blanked = np.ascontiguousarray(blanked)
-
-    @staticmethod
-    def from_vtk(image: Any, scalars: str | None = None, preference: str = "point") -> Volume:
-        """Make a volume of a VTK image, to be drawn again and again.
-
-        Parameters
-        ----------
-        image : vtkImageData or pyvista.ImageData
-            Its origin, spacing, direction matrix and ghost arrays are honoured.
-        scalars : str, optional
-            Name of the array; the active scalars by default, else the only array there is.
-        preference : {"point", "cell"}
-            Which array, where points and cells both have one of that name.
-
-        Returns
-        -------
-        Volume
-            It shares memory with the point array where that is contiguous and of a type that
-            kernels read; cell data become point data.
-
-        Raises
-        ------
-        InvalidVolumeError
-            If there are no such scalars, or not a grid of at least 2 x 2 x 2 points.
-        UnsupportedError
-            If it is another kind of grid, or the scalars have several components.
-        """
-        from_vtk = registry.method("Volume.from_vtk")
-        return from_vtk(image, scalars, preference)  # type: ignore[no-any-return]
 
     def in_view(self, *cameras: Any, window_size: Sequence[int]) -> Volume:
         """Return what of several levels these views require: of one, itself."""
         return self
 
     def load(self, *cameras: Any, window_size: Sequence[int] = (1, 1)) -> Volume:
-        """Return the volume in memory, of several levels the one that views require.
-
-        DeviceMemoryError if it is read chunk by chunk, and the host has not so much memory free.
-        """
+        """Return the volume in memory, of several levels the one that views require."""
         found = self.in_view(*cameras, window_size=window_size) if cameras else self
         if not found.chunked:
             return found

@@ -17,10 +17,6 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
     Until then the data are under a temporary name in the same folder; on any failure, an
     interrupt included, they are removed and what was at ``path`` stays as it was.
-
-    ``path``: the target. A symbolic link is followed. Yields: Seekable binary file. Raises
-    VDIFileError if the target cannot be written; when the block is entered, or when the disk is
-    full.
     """
     target, temporary, stream = _begun(path)
     try:
@@ -34,7 +30,9 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     except BaseException as error:
         temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise VDIFileError(f"{target} could not be written: {error.strerror}") from error
+            raise VDIFileError(
+                f"{target} could not be written: {error.strerror or error}"
+            ) from error
         raise
 
 
@@ -70,12 +68,12 @@ def _begun(path: str | os.PathLike[str]) -> tuple[Path, Path, BinaryIO]:
     try:
         target = Path(os.path.realpath(path))
         if target.exists() and not target.is_file():
-            raise OSError(0, "it is a folder, or not a regular file; choose another name")
+            raise OSError(0, "it is a folder, or not a regular file")
         if not target.parent.is_dir():
-            raise OSError(0, f"the folder {target.parent} does not exist; create it")
+            raise OSError(0, f"the folder {target.parent} does not exist (create it)")
         # Shortened: the temporary name may not be longer than the folder's file system allows
         temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
         return target, temporary, temporary.open("x+b")
     except (OSError, ValueError) as error:  # a name that holds a null character, say
-        why = getattr(error, "strerror", None) or error
+        why = f"{getattr(error, 'strerror', None) or error}; choose another path"
         raise VDIFileError(f"{os.fspath(path)} cannot be written: {why}") from error

@@ -35,46 +35,15 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
 
     @dataset.setter
     def dataset(self, volume: Any) -> None:
-        if self.GetSource() is None:
-            super().SetInputDataObject(volume)  # a VDI, or refused by name
-        else:
-            self.own_source("its volume").SetInputDataObject(volume)
-
-    def SetInputDataObject(self, *args: Any) -> None:  # noqa: N802
-        """Draw another volume as this one, or a VDI in its canonical form."""
-        if self.GetSource() is None or is_vdi_image(args[-1]):
-            super().SetInputDataObject(*args)
-        else:
-            self.dataset = args[-1]
+        self.SetInputData(volume)
 
     def SetInputData(self, data: Any) -> None:  # noqa: N802
         """Draw another volume as this one, or a VDI, or its canonical image."""
-        if self.GetSource() is None or not isinstance(data, vtkImageData) or is_vdi_image(data):
+        source = self.GetSource()
+        if source is None or not isinstance(data, vtkImageData) or is_vdi_image(data):
             super().SetInputData(data)
         else:
-            self.dataset = data
-
-    def copy(self) -> PlotterVDIMapper:
-        """Return a mapper, for another actor, that draws the same VDI in the same way.
-
-        A VDI is never copied: it does not change. The lookup table is shared.
-        """
-        other = self.NewInstance()
-        other.ShallowCopy(self)
-        return other
-
-    def NewInstance(self) -> PlotterVDIMapper:  # noqa: N802
-        """Return another mapper, with nothing to draw yet."""
-        return PlotterVDIMapper()
-
-    def ShallowCopy(self, other: Any) -> None:  # noqa: N802
-        """Draw what another mapper of this class draws, in the same way, with its lookup table."""
-        super().ShallowCopy(other)
-        if isinstance(other, PlotterVDIMapper):
-            theirs: Any = other
-            self.lookup_table = None  # which another range would change
-            self.scalar_range = theirs.scalar_range
-            self.lookup_table = theirs.lookup_table
+            source.SetInputDataObject(data)
 
 
 class PlotterVDIActor(VDIActorMethods, Volume):
@@ -96,39 +65,6 @@ class PlotterVDIActor(VDIActorMethods, Volume):
     def camera_to_come(self, renderer: Any) -> Any:
         """Return the camera of a renderer's next picture."""
         return first_camera(renderer, renderer.ComputeVisiblePropBounds())
-
-    def copy(self, deep: bool = True) -> PlotterVDIActor:
-        """Return another actor that shows the same VDI, with a mapper of its own.
-
-        Parameters
-        ----------
-        deep : bool
-            Copy the volume property and the lookup table as well, so that a change of one actor's
-            is none of the other's. A VDI is never copied: it does not change.
-        """
-        other = PlotterVDIActor()
-        other.ShallowCopy(self)
-        mapper = other.mapper
-        if deep:
-            prop = self.GetProperty()
-            copied = type(prop)()  # an actor without its volume has a plain vtkVolumeProperty
-            copied.DeepCopy(prop)
-            mapper.lookup_table = _copied(self.mapper.lookup_table)
-            if isinstance(prop, pv.VolumeProperty) and prop.GetColorChannels() == 3:
-                # The table is followed from now on, as by PyVista, but what is there is shown
-                color, opacity = copied.GetRGBTransferFunction(), copied.GetScalarOpacity()
-                copied.apply_lookup_table(mapper.lookup_table)
-                copied.SetColor(color)
-                copied.SetScalarOpacity(opacity)
-            other.SetProperty(copied)
-        return other
-
-
-def _copied(table: pv.LookupTable) -> pv.LookupTable:
-    copied = pv.LookupTable()
-    copied.DeepCopy(table)
-    vars(copied).update(vars(table))  # the name of its colour map, and the like
-    return copied
 
 
 def first_camera(renderer: Any, bounds: Any) -> Any:

@@ -27,7 +27,6 @@ from pyvista_vdi.io.volumes import read_volume
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import ArrayChoice, Look, range_to_classify
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import (
     Deferral,
     DrawingOptions,
@@ -40,7 +39,7 @@ from pyvista_vdi.model.options import (
     record,
 )
 from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
-from pyvista_vdi.model.vdi import VDI, picture_view
+from pyvista_vdi.model.vdi import VDI, DeferredVDI, picture_view
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper, first_camera
 from pyvista_vdi.plotting.classify import Looks, stored_table
 from pyvista_vdi.plotting.progress import progress_callback
@@ -223,7 +222,7 @@ def added(plotter: Any, volume: Any, asked: Addition) -> Any:
     thing = shown.thing if several is None else several
     if isinstance(thing, VDISource):
         mapper.SetInputConnection(thing.GetOutputPort())
-        mapper.driver.input.of_scene = True
+        thing.of_scene = True
     else:
         mapper.SetInputData(thing)
         if shown.prop is not None:  # which classifies what keeps values

@@ -204,7 +204,7 @@ class PlotterVDIs(Component):
         ------
         UnsupportedError
             If there is nothing to edit: RGBA brings its colours, and so does a VDI without its
-            volume, unless it is a deferred one.
+            volume, unless it keeps values.
         InvalidArgumentError
             If the actor is no volume of this plotter, or another argument cannot be used.
         """

@@ -6,11 +6,9 @@ import numpy as np
 
 from pyvista_vdi.device import get_runtime, padded
 from pyvista_vdi.device.constants import GROUP
-from pyvista_vdi.model.classify_values import CELLS, Media, ValuesLook, classify
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import DeviceLike
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, Media, ValuesLook, classify
 
 
 def classify_on_device(

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device.constants import BLOCK_RAYS, STEEPEST
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.classify_values import Media
 from pyvista_vdi.model.ray_forms import Rectangle, inverse_affine
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, Media
 
 #: Rays of a packet, side by side.
 LANES = BLOCK_RAYS

@@ -19,9 +19,8 @@ from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag, as_float, as_range
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import FrameRequest
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 
 Floats: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]

@@ -15,10 +15,8 @@ from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together, padded
 from pyvista_vdi.device.constants import BUNDLE, GROUP, LIST_HEADER, LISTS_PER_ITEM, SLABS, STACK
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.classify_values import CELLS, ValuesLook
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.float32_limits import lists_are_far
-from pyvista_vdi.model.vdi import VDI, made_vdi
+from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, ValuesLook, made_vdi
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.packets import share_lit
 from pyvista_vdi.volume.upload import release_voxels

@@ -6,18 +6,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActor
-    from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapper
-    from pyvista_vdi.vtk_pipeline.filters.convert import (
-        vdi_from_image,
-        vdi_to_image,
-        volume_from_vtk,
+    from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActor as VDIActor
+    from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapper as VDIMapper
+    from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image as vdi_from_image
+    from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image as vdi_to_image
+    from pyvista_vdi.vtk_pipeline.filters.convert import volume_from_vtk as volume_from_vtk
+    from pyvista_vdi.vtk_pipeline.filters.files import VDIReader as VDIReader
+    from pyvista_vdi.vtk_pipeline.filters.files import VDIWriter as VDIWriter
+    from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage as VDIToImage
+    from pyvista_vdi.vtk_pipeline.filters.properties import (
+        transfer_function_from_property as transfer_function_from_property,
     )
-    from pyvista_vdi.vtk_pipeline.filters.files import VDIReader, VDIWriter
-    from pyvista_vdi.vtk_pipeline.filters.image import VDIToImage
-    from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
-    from pyvista_vdi.vtk_pipeline.filters.source import VDISource
-    from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
+    from pyvista_vdi.vtk_pipeline.filters.source import VDISource as VDISource
+    from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus as VDIStatus
 
 #: Public name to module. Loaded when asked for: converters must not load VTK's OpenGL modules.
 _MODULES = {
@@ -33,20 +34,6 @@ _MODULES = {
     "vdi_to_image": "filters.convert",
     "volume_from_vtk": "filters.convert",
 }
-
-__all__ = [
-    "VDIActor",
-    "VDIMapper",
-    "VDIReader",
-    "VDISource",
-    "VDIStatus",
-    "VDIToImage",
-    "VDIWriter",
-    "transfer_function_from_property",
-    "vdi_from_image",
-    "vdi_to_image",
-    "volume_from_vtk",
-]
 
 
 def __getattr__(name: str) -> Any:

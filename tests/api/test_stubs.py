@@ -24,7 +24,7 @@ PACKAGE = Path(pyvista_vdi.__file__).parent
 HOMES = (collections.abc, typing, npt, types)
 CLASSES = {
     "AmbientOcclusion": "model.ambient_occlusion",
-    "DeferredVDI": "model.deferred",
+    "DeferredVDI": "model.vdi",
     "Pick": "raycasting.picking",
     "Settings": "api",
     "TransferFunction": "model.transfer_function",

@@ -46,7 +46,6 @@ class Case:
     #: ``add_volume`` raises, and so does ``add_vdi``: one of this package's errors, or the same
     both_refuse: bool = False
     warns: str | None = None  # a pattern of a VDIWarning that comes with the right picture
-    warns_if: tuple[str, ...] = ("auto", "vdi")  # and with which ways of drawing it comes
     #: Where ``add_volume`` is wrong: how, and what the picture is compared with instead
     note: str = ""
     quick: bool = False  # runs with every change, not only at night
@@ -54,7 +53,7 @@ class Case:
 
 def expectations(keywords):
     """Take what is said about a case, rather than given to ``add_volume``, out of keywords."""
-    said = ("refused", "both_refuse", "warns", "warns_if", "note", "quick")
+    said = ("refused", "both_refuse", "warns", "note", "quick")
     return {name: keywords.pop(name) for name in said if name in keywords}
 
 
@@ -204,7 +203,7 @@ def outcome(case, way="vdi"):
             return Outcome()
         return Outcome(f"is not refused by {case.refused[0]!r}: {ours.error!r}, {ours.ours}")
     theirs = draw(case, False)
-    wrong = _errors(case, theirs, ours, case.warns if way in case.warns_if else None)
+    wrong = _errors(case, theirs, ours, case.warns if way in ("auto", "vdi") else None)
     return Outcome(wrong) if wrong or case.both_refuse else _compared(theirs, ours)
 
 

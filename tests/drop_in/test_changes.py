@@ -64,7 +64,6 @@ change("a clipping plane", clip((1, 0.5, 0)))
 change("remove_actor", lambda pl, a, v: pl.remove_actor(a), quick=True)
 change("remove_actor and add_actor", lambda pl, a, v: (pl.remove_actor(a), pl.add_actor(a)))
 change("clear", lambda pl, a, v: pl.clear())
-change("add_actor of a copy", lambda pl, a, v: (pl.remove_actor(a), pl.add_actor(a.copy())))
 
 
 def table():

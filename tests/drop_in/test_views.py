@@ -64,8 +64,7 @@ def give_another(pl):
     pl.reset_camera()
 
 
-INSIDE = "coverage='bounds' needs the eye outside"
-view("camera inside the volume", go_inside, warns=INSIDE, warns_if=("vdi",))
+view("camera inside the volume", go_inside)
 view("a camera of its own", give_another)
 camera("model_transform_matrix", pv.Transform().rotate_z(30).matrix)
 method("set_scale", zscale=1.5)

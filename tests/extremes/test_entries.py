@@ -25,7 +25,6 @@ from reference.raycast import pixel_ray
 
 from pyvista_vdi import Camera, Cropping, Shading, TransferFunction, Volume
 from pyvista_vdi.model.cropping import PRESETS
-from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.raycasting.prepared import PreparedVDI
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 
@@ -70,15 +69,14 @@ def test_needles(runtime, worst):
     check_views(runtime, worst, vdi, turned(camera, volume, (8,), zoom=True), least_drawn=0)
 
 
-@pytest.mark.parametrize("criterion", CRITERIA[:1])
-def test_supersegments_of_far_entries_are_ordered_and_have_a_thickness(runtime, worst, criterion):
+def test_supersegments_of_far_entries_are_ordered_and_have_a_thickness(runtime, worst):
     """Steps of few units in the last place of their depth, which rounding could make nothing."""
     volume = field_volume((1e-3, 1, 1e3))
     camera = view(volume, zoom=True)
     function = transfer(unit_distance=5e-3)
     vdi = generate_vdi(
         volume, camera, WINDOW, function, sample_distance=volume.length / 2**19,
-        max_supersegments=40, criterion=criterion, device=runtime,
+        max_supersegments=40, device=runtime,
     )  # fmt: skip
     assert vdi.counts.max() > 1
     assert (vdi.back > vdi.front).all()

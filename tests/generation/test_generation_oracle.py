@@ -10,6 +10,7 @@ between two points, so bounds are evaluated, not linearised.
 from __future__ import annotations
 
 import itertools
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -25,8 +26,8 @@ from sampling_uncertainty import uncertainties
 
 from pyvista_vdi import Camera, Cancelled
 from pyvista_vdi.model.chunked import VOXEL_TYPES
-from pyvista_vdi.model.options import CRITERIA
 from pyvista_vdi.model.transfer_function import TransferFunction
+from pyvista_vdi.model.types import Criterion
 from pyvista_vdi.model.volume import Volume
 
 WINDOW = (14, 10)
@@ -149,7 +150,7 @@ def test_any_volume_keeps_the_laws(runtime, dtype, interpolation, direction, cri
     dtype=st.sampled_from(VOXEL_TYPES),
     interpolation=st.sampled_from(["nearest", "linear"]),
     direction=st.sampled_from(["none", "rotated", "mirrored"]),
-    criterion=st.sampled_from(CRITERIA),
+    criterion=st.sampled_from(get_args(Criterion)),
     budget=st.integers(1, 64),
 )
 def test_any_scene(default_runtime, **scene):
@@ -158,7 +159,7 @@ def test_any_scene(default_runtime, **scene):
 
 def test_data_of_many_runs_per_list(runtime):
     """Which are cut where they could stay."""
-    for criterion in CRITERIA:
+    for criterion in get_args(Criterion):
         check_against_reference(runtime, 2500, noise(2500, 12, "linear"), 4, criterion)
 
 
@@ -193,7 +194,7 @@ def test_a_ray_may_have_more_runs_than_are_recorded(runtime, budget):
     scene = volume, camera, WINDOW, looks
     merged, cut = (
         generate_vdi(*scene, max_supersegments=budget, criterion=name, device=runtime)
-        for name in CRITERIA
+        for name in get_args(Criterion)
     )
     assert cut.counts.max() <= budget
     np.testing.assert_array_equal(cut.counts > 0, merged.counts > 0)

@@ -14,7 +14,7 @@ from pyvista_vdi.errors import (
     InvalidArgumentError,
     InvalidVDIError,
 )
-from pyvista_vdi.model.deferred import lengths_of
+from pyvista_vdi.model.vdi import lengths_of
 
 LOOKS = TransferFunction([[1, 0, 0], [0, 1, 0], [0, 0, 1]], [0, 0.8, 0.3], (100, 300))
 
@@ -111,9 +111,11 @@ def test_classification_is_the_mean_over_values_of_that_mean_and_spread(default_
         if tau == 0:
             continue
         assert vdi.front[at] == made.front[k]
-        assert vdi.optical_depth[at] == pytest.approx(tau, rel=2e-3, abs=1e-6)
+        # A part of a cell counts as its mean: for opacity half of what it changes by in a cell, 1.6
+        # / 2^15 = 5e-5 at most. Measured, where it is 0.0045: 7.4e-5 of it; of a colour 2.7e-6
+        assert vdi.optical_depth[at] == pytest.approx(tau, rel=2e-4, abs=1e-6)
         wanted = (alpha[:, np.newaxis] * color).mean(axis=0) / alpha.mean()
-        assert vdi.color[at] == pytest.approx(wanted, abs=2e-3)
+        assert vdi.color[at] == pytest.approx(wanted, abs=1e-5)
         at += 1
     assert at == vdi.n_supersegments
     assert kinds == {(False, False), (True, False), (False, True)}

@@ -37,13 +37,6 @@ def plotter():
     plotter.close()
 
 
-def swapped(plotter, actor, other):
-    """The picture with another actor in the place of one."""
-    plotter.remove_actor(actor)
-    plotter.add_actor(other, reset_camera=False)
-    return shown(plotter)
-
-
 def test_a_replaced_property_takes_effect(plotter):
     table = pv.LookupTable("hot", scalar_range=(0, N - 1))
     table.apply_opacity("linear_r")
@@ -66,46 +59,6 @@ def test_a_replaced_property_takes_effect(plotter):
     with pytest.raises(errors.UnsupportedError, match="2D transfer function"):
         actor.prop = refused
     assert actor.prop is prop
-
-
-def shade(actor):
-    actor.prop.shade = True
-    actor.prop.ambient, actor.prop.diffuse = 0.0, 0.1
-
-
-def another_property(actor):
-    table = pv.LookupTable("hot", scalar_range=(0, 1))
-    actor.prop = pv.VolumeProperty(lookup_table=table)
-
-
-PROPERTIES = {
-    "shade": shade,
-    "unit distance": lambda actor: setattr(actor.prop, "opacity_unit_distance", 0.2),
-    "lookup table": lambda actor: setattr(actor.mapper.lookup_table, "cmap", "hot"),
-    "property": another_property,
-}
-
-
-@pytest.mark.parametrize("change", PROPERTIES.values(), ids=PROPERTIES)
-def test_a_copy_s_properties_are_its_own(plotter, change):
-    actor = plotter.add_vdi(ramp(), draw="vdi", **LOOKS)
-    actor.mapper.SetMaximumImageSampleDistance(8.0)
-    actor.mapper.GetSource().SetCamera(plotter.camera)
-    actor.mapper.GetSource().SetWindowSize(WINDOW)
-    before = shown(plotter)
-    vdi = actor.vdi
-    twin = actor.copy()
-    np.testing.assert_array_equal(swapped(plotter, actor, twin), before)
-    assert twin.vdi is vdi, "a copy shows the same VDI"
-    mapper = twin.mapper  # and by the same settings
-    assert mapper.GetMaximumImageSampleDistance() == 8.0
-    change(twin)
-    changed = shown(plotter)
-    assert np.abs(changed - before).max() > SEEN
-    np.testing.assert_array_equal(swapped(plotter, twin, actor), before)
-    assert actor.vdi is vdi
-    change(actor)
-    np.testing.assert_array_equal(shown(plotter), changed)
 
 
 def test_another_vdi_takes_the_place_of_the_first(plotter):

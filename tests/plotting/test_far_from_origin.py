@@ -82,7 +82,6 @@ def picture(scene, at):
     return image
 
 
-@pytest.mark.filterwarnings("ignore:coverage='bounds' needs the eye outside")
 @pytest.mark.parametrize(
     "scene",
     [

@@ -42,13 +42,6 @@ def keeping(what, use):
     return what
 
 
-def show_copy(plotter, actor, **options):
-    copied = actor.copy(**options)
-    plotter.remove_actor(actor)
-    plotter.add_actor(copied)
-    copied.mapper.SetSampleDistance(actor.mapper.GetSampleDistance())  # PyVista's copies lose it
-
-
 def own_table(actor):
     actor.mapper.lookup_table = made = table()
     actor.prop.apply_lookup_table(made)
@@ -79,7 +72,6 @@ CHANGES = {
     "prop: another": lambda p, a: keeping(
         table(), lambda made: setattr(a, "prop", pv.VolumeProperty(lookup_table=made))
     ),
-    "shallow copy": lambda p, a: show_copy(p, a, deep=False),
     "SetFinalColorWindow": lambda p, a: a.mapper.SetFinalColorWindow(0.5),
     "SetFinalColorLevel": lambda p, a: a.mapper.SetFinalColorLevel(0.2),
 }

@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.chunked import VOXEL_TYPES
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.transfer_function import TransferFunction
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting import packets
 

@@ -13,7 +13,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi.quality import background
 from pyvista_vdi.quality.rate import FrameRate
 from pyvista_vdi.quality.view_error import ViewError
-from pyvista_vdi.vtk_pipeline.drawing import planner
+from pyvista_vdi.vtk_pipeline.drawing import driver
 from pyvista_vdi.vtk_pipeline.vtk import vtk_to_numpy, vtkUnsignedCharArray
 
 #: Odd, so that no smaller image divides it.
@@ -73,7 +73,7 @@ def no_estimates(monkeypatch):
             answer.asked += 1
             return ViewError(answer.ssim, 1)
 
-    monkeypatch.setattr(planner, "ViewErrorEstimator", Estimator)
+    monkeypatch.setattr(driver, "ViewErrorEstimator", Estimator)
     return answer
 
 

@@ -185,6 +185,7 @@ REFUSED = {
         lambda s: s.mapper.AddInputConnection(0, s.source.GetOutputPort()),
         "",
     ),
+    "ShallowCopy": (lambda s: s.actor.ShallowCopy(s.actor), ""),
     "MaskInput": (
         lambda s: s.mapper.SetMaskInput(image_of(values().ravel().astype(np.uint8))),
         "",

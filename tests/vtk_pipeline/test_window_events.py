@@ -25,7 +25,7 @@ from watched_windows import (
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import DeviceError, VDIWarning
 from pyvista_vdi.quality import background
-from pyvista_vdi.vtk_pipeline.drawing import planner
+from pyvista_vdi.vtk_pipeline.drawing import driver
 from pyvista_vdi.vtk_pipeline.vtk import vtkPlane
 
 pytestmark = pytest.mark.gl
@@ -100,7 +100,7 @@ def test_moves(plotter, coarsest):
 def test_no_vdi_is_made_while_a_hand_moves_and_what_serves_goes_on_at_rest(
     plotter, gate, no_estimates, monkeypatch
 ):
-    monkeypatch.setattr(planner, "SETTLED", LONG)  # however long a frame takes
+    monkeypatch.setattr(driver, "SETTLED", LONG)  # however long a frame takes
     actor = auto(plotter, draw="vdi")
     no_estimates.ssim = 0.5
     turned(plotter, 60)

@@ -14,14 +14,12 @@ from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float, as_whole
 from pyvista_vdi.model.collection import RATE
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.options import MediumOptions
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.quality.background import BackgroundThread, Job
 from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
-from pyvista_vdi.vtk_pipeline.interaction.timer import period_of
 
 #: Bytes of steps that are kept, so that the next round need not read them.
 MEMORY = 1 << 30
@@ -55,11 +53,6 @@ class SeveralInput(Input):
         self._broken: set[int] = set()
         self._unsaid: list[Exception] = []  # why they are
         self._worker = BackgroundThread(thread)
-
-    def classified_by(self, prop: Any) -> Input:
-        """Set the property that classifies the values of all VDIs from now on."""
-        self.prop = prop
-        return self
 
     def on_devices(self) -> list[Any]:
         """Return the VDIs that are ready, and what was classified of that which is shown."""
@@ -136,7 +129,6 @@ class SeriesInput(SeveralInput):
         #: Steps per second, and whether one is shown after the other.
         self.rate, self.playing = RATE, False
         self._clock, self._loop = clock, True
-        self._changed: Callable[..., Any] | None = None  # tells the mapper that it plays
         # Places go on where the series begins anew: place p is step p modulo the steps
         self._place = self._from = 0
         self._since: float | None = None  # when the place before was due; None before a frame
@@ -195,19 +187,9 @@ class SeriesInput(SeveralInput):
         """Return the step, and the time stamp of what classifies it."""
         return self.step, self.prop and (id(self.prop), self.prop.GetMTime())
 
-    def shared(self) -> Input:
-        """Return an input that shows the same step, and plays by itself."""
-        other = SeriesInput(self.collection)
-        other.step, other.prop = self.step, self.prop
-        return other
-
     def look(self, camera: Camera, device: Any) -> None:
         """Read for a device."""
         self.device = device
-
-    def watch(self, changed: Callable[..., Any] | None) -> None:
-        """Call this when it begins to play; ``None`` ends it."""
-        self._changed = changed
 
     def play(
         self, rate: float = RATE, *, loop: bool = True, memory_limit: int | None = None
@@ -223,12 +205,10 @@ class SeriesInput(SeveralInput):
             raise InvalidArgumentError(f"rate must be steps per second, above 0; got {rate!r}")
         self.memory = MediumOptions(memory_limit=memory_limit).memory_limit or self.memory
         self.rate, self._loop = as_float(rate), bool(loop)
-        self.period = period_of(self.rate)
         last = len(self.collection) - 1
         self._begin(0 if not loop and self.step == last else self.step)
         self.playing = last > 0
-        if self._changed is not None:
-            self._changed()
+        self.tell()
 
     def pause(self) -> None:
         """Stay at the step that is shown."""

@@ -17,9 +17,8 @@ from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.series import check_range, checked_time, times_of
 from pyvista_vdi.io import check_write_options
 from pyvista_vdi.io.vdi_file.layout import to_json
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.whole_file import as_path, whole_file, with_suffix
 
 

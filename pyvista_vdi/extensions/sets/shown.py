@@ -7,9 +7,8 @@ from typing import Any
 from pyvista_vdi.extensions.series.shown import ON_DEVICE, SeveralInput
 from pyvista_vdi.extensions.sets.vdi_set import MOST_BLENDED, VDISet
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 
 

@@ -24,9 +24,8 @@ from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.layout import DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.metrics import check_background, over_background
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.whole_file import check_writable, whole_file
 
 #: What the script elements that hold a .vdi file as base64 say of themselves.

@@ -34,7 +34,8 @@ from pyvista_vdi.extensions.web.shown import (
 from pyvista_vdi.model.whole_file import whole_file
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
-from pyvista_vdi.vtk_pipeline.filters.view import as_array
+from pyvista_vdi.vtk_pipeline.drawing.frame import planes_of
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, renderer_view
 
 #: What VTK draws in the same place whatever the view.
 _FIXED = ("vtkTextActor", "vtkCornerAnnotation", "vtkScalarBarActor", "vtkLegendBoxActor")
@@ -80,8 +81,8 @@ def scene_of(plotter: Any, where: str | None, *, follow: bool = False) -> ShownS
         missing: list[str] = []
         if is_vdi(prop):
             matrix, several, mapper = as_array(prop.GetMatrix()), prop.collection, prop.GetMapper()
-            anew = mapper.GetSource() is not None and mapper.GetRegenerate() != "never"
-            vdi = prop.regenerate() if anew and not follow else prop.vdi
+            own = None if follow or mapper.GetRegenerate() == "never" else mapper.GetSource()
+            vdi = own.MakeVDI(own.MakeRequest(renderer_view(renderer, matrix))) if own else prop.vdi
             if vdi is None:
                 continue
             placed: dict[str, Any] = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
@@ -145,8 +146,7 @@ def look_of(actor: Any) -> Any:
 
 def _planes(actor: Any, missing: list[str]) -> list[list[float]]:
     """Return the planes that an actor is clipped to, origin and normal, world."""
-    clipping = actor.GetMapper().GetClippingPlanes() or ()
-    planes = [[*plane.GetOrigin(), *plane.GetNormal()] for plane in clipping]
+    planes = planes_of(actor.GetMapper())
     if actor.GetMapper().GetCropping():
         missing.append("cropping")
     if len(planes) > MOST_PLANES:

@@ -27,9 +27,8 @@ from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file.layout import COARSE, DEFLATE
 from pyvista_vdi.io.vdi_file.writer import write_to
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
-from pyvista_vdi.model.vdi import VDI, picture_view
+from pyvista_vdi.model.vdi import VDI, DeferredVDI, picture_view
 
 Shown: TypeAlias = "VDI | DeferredVDI | VDISeries | VDISet"
 

@@ -109,13 +109,13 @@ class VDIWidget(anywidget.AnyWidget):
     ----------
     vdi : VDI, DeferredVDI, VDISeries, VDISet or vtkImageData
         What to show, or a VDI's VTK form (``pyvista.read("x.vdi")``). All of a series or a set is
-        sent to the browser. The transfer function of a deferred VDI is edited there.
+        sent to the browser. The transfer function of a DeferredVDI is edited there.
     camera : Camera or pyvista.Camera or vtkCamera or dict, optional
         The first view; by default the VDI's own.
     background : str or (float, float, float), optional
         ``"white"``, ``"#204060"`` or RGB from 0 to 1; by default the page shows through.
     **look
-        What the transfer function of a deferred VDI begins with, as for
+        What the transfer function of a DeferredVDI begins with, as for
         :meth:`pyvista_vdi.DeferredVDI.classified`: ``cmap``, ``opacity``, ``clim`` and others.
 
     Attributes

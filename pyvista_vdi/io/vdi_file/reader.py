@@ -39,7 +39,6 @@ from pyvista_vdi.io.vdi_file.layout import (
 )
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import one_of
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.packing import (
     DEPTH_CODES,
@@ -51,7 +50,7 @@ from pyvista_vdi.model.packing import (
     Codes,
     Packed8,
 )
-from pyvista_vdi.model.vdi import VDI, made_vdi
+from pyvista_vdi.model.vdi import VDI, DeferredVDI, made_vdi
 
 #: The first bytes: a ZIP member's local header, whose name stands at byte 30.
 _SIGNATURE = b"PK\x03\x04"

@@ -30,9 +30,8 @@ from pyvista_vdi.io.vdi_file.layout import (
     layouts,
     to_json,
 )
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.packing import DEPTH_CODES, Packed8
-from pyvista_vdi.model.vdi import VDI, length_per_depth, made_vdi
+from pyvista_vdi.model.vdi import VDI, DeferredVDI, length_per_depth, made_vdi
 from pyvista_vdi.model.whole_file import whole_file
 
 #: The oldest time that ZIP knows; a real one would make equal VDIs differ.

@@ -157,8 +157,8 @@ def placed(volume: Volume, spacing: Any, origin: Any) -> Volume:
         return volume
     along = volume.spacing if spacing is None else spacing
     begin = volume.origin if origin is None else origin
-    known: Any = {"name": volume.name, "blanked": volume.blanked}
-    other = Volume(volume.array, along, begin, volume.direction, **known)
+    other = Volume(volume.array, along, begin, volume.direction, name=volume.name)
+    other.blanked = volume.blanked
     other.unit = volume.unit if spacing is None else ""  # another spacing may be in another
     return other
 

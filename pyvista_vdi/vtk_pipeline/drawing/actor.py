@@ -6,16 +6,16 @@ from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.collection import VDICollection
-from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.raycasting.picking import Pick
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
+from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit, Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refuse
-from pyvista_vdi.vtk_pipeline.drawing.screen import place_image, show_image
-from pyvista_vdi.vtk_pipeline.filters.inputs import input_of
-from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_to_come, size_of
+from pyvista_vdi.vtk_pipeline.drawing.screen import LOOKUP, place_image
+from pyvista_vdi.vtk_pipeline.filters.source import input_of
+from pyvista_vdi.vtk_pipeline.filters.view import as_array, framed, size_of
 from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkCamera,
     vtkOpenGLShaderProperty,
     vtkVolume,
     weakly,
@@ -28,7 +28,7 @@ class VDIActorMethods:
     def _become_vdi_actor(self: Any) -> None:
         """Install a shader of its own."""
         super().SetShaderProperty(vtkOpenGLShaderProperty())  # type: ignore[misc]
-        show_image(self)
+        self.GetShaderProperty().SetFragmentShaderCode(LOOKUP)
         place_image(self, 0, (0, 0), (1, 1))
 
     def SetMapper(self: Any, mapper: Any) -> None:
@@ -66,8 +66,6 @@ class VDIActorMethods:
     def SetProperty(self: Any, prop: Any) -> None:
         """Set the volume property, from which the VDI is regenerated.
 
-        What is shared with a copy of this actor is not changed for the other.
-
         Parameters
         ----------
         prop : vtkVolumeProperty
@@ -80,37 +78,11 @@ class VDIActorMethods:
         """
         mapper = self.GetMapper()
         source = None if mapper is None else mapper.GetSource()
-        if source is not None and prop is not source.GetVolumeProperty():
-            mapper.own_source("its property").SetVolumeProperty(prop)
-        elif mapper is not None and (shown := mapper.driver.input) is not None:
-            mine = shown.classified_by(prop)
-            if mine is not shown:
-                mapper.SetInputData(mine)
+        if source is not None:
+            source.SetVolumeProperty(prop)
+        elif mapper is not None and mapper.driver.input is not None:
+            mapper.driver.input.prop = prop
         super().SetProperty(prop)  # type: ignore[misc]
-
-    def ShallowCopy(self: Any, other: Any) -> None:
-        """Show what another actor shows, by a copy of its mapper, which is of one actor.
-
-        Place, property and visibility are VTK's to copy: the property is shared.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it has an ordinary volume mapper.
-        """
-        mapper = other.GetMapper() if hasattr(other, "GetMapper") else None
-        copied = mapper
-        if isinstance(mapper, VDIMapperMethods):
-            copied = mapper.NewInstance()
-            copied.ShallowCopy(mapper)
-        self.SetMapper(copied)  # which refuses VTK's
-        super().ShallowCopy(other)  # type: ignore[misc]
-        self._become_vdi_actor()  # VTK has it share the other one's shader
-        self.SetMapper(copied)
-
-    def NewInstance(self) -> VDIActorMethods:
-        """Return another actor of this class, with nothing to show yet."""
-        return type(self)()
 
     @property
     def vdi(self: Any) -> VDI | None:
@@ -178,9 +150,12 @@ class VDIActorMethods:
 
     @opacity_multiplier.setter
     def opacity_multiplier(self: Any, multiplier: float) -> None:
-        self.GetMapper().SetOpacityMultiplier(multiplier)
+        if self._driver is not None:  # else it raises
+            self.GetMapper().SetOpacityMultiplier(multiplier)
 
-    def pick(self: Any, x: float, y: float) -> Pick | None:
+    def pick(
+        self: Any, x: float, y: float, opacity_threshold: float = DEFAULT_OPACITY
+    ) -> Pick | None:
         """Return the supersegment that is seen at a place of the window.
 
         Parameters
@@ -188,12 +163,13 @@ class VDIActorMethods:
         x, y : float
             Display coordinates: pixels of the window from its lower left corner, as in VTK's
             events and pickers.
+        opacity_threshold : float
+            Opacity that the ray must reach in the VDI, from its beginning on.
 
         Returns
         -------
         Pick or None
-            The first supersegment that reaches the opacity set by
-            ``GetMapper().SetPickingOpacity(...)``, and where the ray enters it, in world
+            The first supersegment that reaches it, and where the ray enters it, in world
             coordinates. ``None`` where nothing of the VDI is hit, where something opaque hid the
             hit in the last frame, and where the actor is invisible or not pickable.
 
@@ -208,7 +184,8 @@ class VDIActorMethods:
                 "nothing shows this actor yet: add it to a renderer of a window first"
             )
         there = [r for r in shown if r.IsInViewport(int(x), int(y))]
-        return self._driver.pick(there[0], x, y) if there else None  # type: ignore[no-any-return]
+        hit = FirstHit.of(opacity_threshold, accumulated=True)
+        return self._driver.pick(there[0], x, y, hit) if there else None  # type: ignore[no-any-return]
 
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
         """Generate the VDI anew, now.
@@ -245,21 +222,23 @@ class VDIActorMethods:
         driver.failed = ()
         driver.said.clear()
         matrix = as_array(self.GetMatrix())
-        renderer, shown = driver.renderer(), driver.input
-        shown.note_scene(driver.renderers, matrix)
+        renderer = driver.renderer()
+        source.note_scene(driver.renderers, matrix)
         if camera is not None:
             source.SetCamera(camera, matrix)
         elif renderer is not None:
-            shown.take_camera(self.camera_to_come(renderer), matrix)
+            source.take_camera(self.camera_to_come(renderer), matrix)
         if window_size is not None:
             source.SetWindowSize(window_size)
         elif renderer is not None and min(renderer.GetSize()) > 0:
-            shown.take_size(size_of(renderer))
+            source.take_size(size_of(renderer))
         return source.GetVDI()  # type: ignore[no-any-return]
 
     def camera_to_come(self, renderer: Any) -> Any:
-        """Return the ``vtkCamera`` of a renderer's next picture."""
-        return camera_to_come(renderer)
+        """Return the camera of a renderer's next picture: its own, or what VTK will make."""
+        if renderer.IsActiveCameraCreated():
+            return renderer.GetActiveCamera()
+        return framed(vtkCamera(), renderer, renderer.ComputeVisiblePropBounds())
 
 
 refuse(VDIActorMethods, OF_ACTORS)

@@ -8,10 +8,10 @@ import numpy as np
 
 from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.vtk_pipeline.drawing.screen import fill_viewport
-from pyvista_vdi.vtk_pipeline.filters.algorithm import Algorithm
+from pyvista_vdi.vtk_pipeline.filters.algorithm import WHOLE_EXTENT, Algorithm
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
-from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkStreamingDemandDrivenPipeline
+from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject
 
 _EXTENT = (0, 1, 0, 1, 0, 1)
 _EMPTY = (0, -1, 0, -1, 0, -1)
@@ -72,8 +72,9 @@ class Box(Algorithm):
 
     def give_components(self, components: int) -> None:
         """Set the voxels' components: VTK asks for four where they are dependent."""
-        self.components = components
-        self._allocate()
+        if components != self.components:
+            self.components = components
+            self._allocate()
 
     def place(self, bounds: tuple[float, ...] | None) -> None:
         """Set the bounds, model frame; ``None``: none."""
@@ -119,8 +120,7 @@ class Box(Algorithm):
 
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the voxels."""
-        key = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
-        outputs.GetInformationObject(0).Set(key, _EXTENT, 6)
+        outputs.GetInformationObject(0).Set(WHOLE_EXTENT, _EXTENT, 6)
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:

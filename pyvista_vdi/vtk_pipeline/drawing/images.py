@@ -41,8 +41,6 @@ class VolumePicture:
     ----------
     bounds : tuple of float
         The volume's, model frame.
-    shaded : bool
-        Whether it is lit.
     pictures : int
         How many were drawn.
 
@@ -55,7 +53,6 @@ class VolumePicture:
     def __init__(self, request: Request, *, in_bricks: bool = False) -> None:
         self.request = request
         self.bounds = request.volume.bounds
-        self.shaded = request.transfer_function.shading is not None
         self.pictures = 0
         volume, sampling = request.volume, request.options
         room = picture_room(

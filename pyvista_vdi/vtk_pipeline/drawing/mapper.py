@@ -10,13 +10,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
+from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
 from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refuse
 from pyvista_vdi.vtk_pipeline.drawing.settings import add_settings
-from pyvista_vdi.vtk_pipeline.filters.inputs import Input, SourceInput, input_of, input_of_port
-from pyvista_vdi.vtk_pipeline.filters.source import VDISource
+from pyvista_vdi.vtk_pipeline.filters.source import VDISource, input_of
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
 
 #: Coarsest preview by default: every fourth pixel along each edge. VTK's default is 10.
@@ -52,24 +51,15 @@ class VDIMapperMethods:
         self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
         self.AddObserver("VolumeMapperRenderEndEvent", _on_end)
 
-    def own_source(self, what: str) -> VDISource:
-        """Return the source.
-
-        Raises
-        ------
-        UnsupportedError
-            If there is none; ``what`` says what cannot be changed.
-        """
+    def SetSampleDistance(self, distance: float) -> None:
+        """Set the length of a step, model units, from which the VDI is regenerated."""
         source = self.GetSource()
         if source is None:
             raise UnsupportedError(
-                f"a VDI without its volume keeps {what}: generate another from the volume"
+                "a VDI without its volume keeps the steps that it was made of: generate another "
+                "from the volume"
             )
-        return source
-
-    def SetSampleDistance(self, distance: float) -> None:
-        """Set the length of a step, model units, from which the VDI is regenerated."""
-        self.own_source("the steps that it was made of").SetSampleDistance(distance)
+        source.SetSampleDistance(distance)
 
     def GetSampleDistance(self: Any) -> float:
         """Return the length of a step, model units; VTK's default where none was set."""
@@ -77,24 +67,22 @@ class VDIMapperMethods:
         set_by_hand = None if source is None else source.GetSampleDistance()
         return super().GetSampleDistance() if set_by_hand is None else set_by_hand  # type: ignore[misc]
 
-    def SetInputConnection(self, *args: Any) -> None:
-        """Draw what a :class:`VDISource` (or a reader of canonical images) makes."""
-        port = args[-1]
-        self._set_input(None if port is None else input_of_port(port))
-
-    def SetInputDataObject(self, *args: Any) -> None:
-        """Draw a VDI in its canonical form."""
-        self.SetInputData(args[-1])
-
-    def SetInputData(self, data: Any) -> None:
+    def SetInputData(self: Any, data: Any) -> None:
         """Draw a VDI, its canonical image, a series (:attr:`VDIActor.player`) or a set of VDIs."""
-        self._set_input(None if data is None else input_of(data))
+        self.driver.set_input(None if data is None else input_of(data))
+        self.Modified()
 
     SetVDI = SetInputData
 
+    def SetInputConnection(self, *args: Any) -> None:
+        """Draw what a :class:`VDISource` (or a reader of canonical images) makes."""
+        self.SetInputData(args[-1])
+
+    SetInputDataObject = SetInputConnection
+
     def RemoveInputConnection(self, *args: Any) -> None:
         """Draw nothing any more; RemoveAllInputConnections and RemoveAllInputs do the same."""
-        self._set_input(None)
+        self.SetInputData(None)
 
     RemoveAllInputConnections = RemoveAllInputs = RemoveInputConnection
 
@@ -111,12 +99,12 @@ class VDIMapperMethods:
         source = self.driver.input
         if source is None:
             return None
-        return source.last() if isinstance(source, SourceInput) else source.vdi()
+        return source.last() if isinstance(source, VDISource) else source.vdi()
 
     def GetSource(self) -> VDISource | None:
         """Return the :class:`VDISource` at the input, if it is one."""
         source = self.driver.input
-        return source.source if isinstance(source, SourceInput) else None
+        return source if isinstance(source, VDISource) else None
 
     def SetDevice(self, device: Any) -> None:
         """Choose the OpenCL device; ``None`` is the default one."""
@@ -135,39 +123,6 @@ class VDIMapperMethods:
     def AutoAdjustSampleDistancesOff(self: Any) -> None:
         """Draw every frame in full."""
         self.SetAutoAdjustSampleDistances(False)
-
-    def ShallowCopy(self: Any, other: Any) -> None:
-        """Draw what another :class:`VDIMapper` draws, in the same way; the source is shared.
-
-        Raises
-        ------
-        InvalidArgumentError
-            If it is a mapper of VTK's.
-        """
-        if not isinstance(other, VDIMapperMethods):
-            raise InvalidArgumentError(
-                f"a VDIMapper copies a VDIMapper; got {type(other).__name__}: put a VDISource "
-                "between its input and this mapper (SetInputConnection)"
-            )
-        theirs: Any = other
-        shown = other.driver.input
-        self.driver.set_input(None if shown is None else shown.shared())
-        self.driver.settings = other.driver.settings
-        cropping = ("Cropping", "CroppingRegionPlanes", "CroppingRegionFlags")
-        for name in ("Device", "MaximumImageSampleDistance", *cropping):
-            getattr(self, f"Set{name}")(getattr(theirs, f"Get{name}")())
-        planes = theirs.GetClippingPlanes()
-        self.RemoveAllClippingPlanes()
-        for i in range(0 if planes is None else planes.GetNumberOfItems()):
-            self.AddClippingPlane(planes.GetItem(i))
-
-    def NewInstance(self) -> VDIMapperMethods:
-        """Return another mapper of this class, with nothing to draw yet."""
-        return type(self)()
-
-    def _set_input(self: Any, source: Input | None) -> None:
-        self.driver.set_input(source)
-        self.Modified()
 
 
 refuse(VDIMapperMethods, OF_MAPPERS)

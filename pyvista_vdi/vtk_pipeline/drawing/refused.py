@@ -7,6 +7,12 @@ from typing import Any
 
 from pyvista_vdi.errors import UnsupportedError
 
+#: Why nothing here is copied.
+COPIES = (
+    "a VDIMapper belongs to one VDIActor, and what it has drawn to it: add the volume, or its VDI "
+    "(actor.vdi), once more, or put another VDIMapper and VDIActor behind the same VDISource"
+)
+
 #: Methods of VTK's GPU volume mapper by why they are refused. What turns a thing off is accepted.
 OF_MAPPERS: Mapping[str, tuple[str, ...]] = {
     "a VDI stores what is composited along a ray, so only composite blending is supported: draw "
@@ -25,11 +31,13 @@ OF_MAPPERS: Mapping[str, tuple[str, ...]] = {
         *("SetScalarMode", "SetScalarModeToUsePointFieldData", "SetScalarModeToUseCellData"),
         *("SetScalarModeToUseCellFieldData", "SelectScalarArray", "SetArrayName", "SetArrayId"),
     ),
+    COPIES: ("ShallowCopy", "copy"),
     "a VDIMapper draws one VDI: give each its own VDIMapper and VDIActor": ("AddInputConnection",),
 }
 
 #: Methods of vtkVolume.
 OF_ACTORS: Mapping[str, tuple[str, ...]] = {
+    COPIES: ("ShallowCopy", "copy"),
     "a VDI is placed in the world: leave the coordinate system at WORLD, and move it by "
     "SetUserMatrix or SetPosition": (
         *("SetCoordinateSystem", "SetCoordinateSystemToPhysical", "SetCoordinateSystemToDevice"),
@@ -47,7 +55,7 @@ def refuse(of: type, methods: Mapping[str, tuple[str, ...]]) -> None:
 
 
 def _refusal(name: str, reason: str) -> Callable[..., None]:
-    def refused(self: Any, *args: Any) -> None:
+    def refused(self: Any, *args: Any, **named: Any) -> None:
         off = name.startswith("Set") and args and (args[-1] is None or args[-1] == 0)
         if not off:
             raise UnsupportedError(f"{name} is not for a VDI: {reason}")

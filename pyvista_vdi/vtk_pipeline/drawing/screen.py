@@ -95,10 +95,8 @@ _VIEWPORT = "vdiViewport"
 #: VTK calls the three functions. Where volumes are peeled it has rays cast between two layers of
 #: translucent geometry, again and again: the picture cannot be taken apart, and is given whole to
 #: what begins at the near plane, and so lies before all that is translucent, as without peeling.
-_LOOKUP = f"""//VTK::System::Dec
+LOOKUP = f"""//VTK::System::Dec
 //VTK::Output::Dec
-in vec3 ip_textureCoords;
-in vec3 ip_vertexPos;
 vec4 g_fragColor = vec4(0.0);
 uniform sampler2D vdiImage;
 uniform float in_scale;
@@ -130,6 +128,7 @@ void finalizeRayCast()
   //VTK::Picking::Exit
   g_fragColor.rgb = g_fragColor.rgb * in_scale + in_bias * g_fragColor.a;
   gl_FragData[0] = g_fragColor;
+  gl_FragData[1] = gl_FragData[2] = vec4(0.0);  // SSAO's place and normal stay
 }}
 
 void main()
@@ -145,11 +144,6 @@ _FILL = """
 """
 
 _POSITION = "//VTK::ComputeClipPos::Impl"
-
-
-def show_image(actor: Any) -> None:
-    """Make an actor's shader look its colours up in an image of the viewport."""
-    actor.GetShaderProperty().SetFragmentShaderCode(_LOOKUP)
 
 
 def place_image(actor: Any, unit: int, origin: tuple[int, int], size: tuple[int, int]) -> None:

@@ -16,7 +16,6 @@ from pyvista_vdi.model.options import (
     declared,
 )
 from pyvista_vdi.model.types import Draw, Policy
-from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, checked_opacity
 
 
 @dataclass(frozen=True)
@@ -29,9 +28,7 @@ class MapperSettings:
     opacity_multiplier: float = 1.0
     transmittance_cutoff: float = TRANSMITTANCE_CUTOFF
     target_fps: float | None = None  # the window's desired update rate
-    adjust_multi_samples: bool = True
     image_distance: float = 1.0
-    picking_opacity: float = DEFAULT_OPACITY
     adjust: bool = True
     off_screen: bool = False
 
@@ -51,25 +48,12 @@ SETTINGS: Mapping[str, Option] = {
     "OpacityMultiplier": _DECLARED["opacity_multiplier"],
     "TransmittanceCutoff": _DECLARED["transmittance_cutoff"],
     "TargetFrameRate": _DECLARED["target_fps"],
-    "AutoAdjustMultiSamples": Option(
-        "adjust_multi_samples",
-        True,
-        "whether previews go without multisampling where that makes them late",
-        "All VDIs in a window must allow it; ``GetMultiSamples()`` stays as it was set.",
-        check=partial(as_flag, name="AutoAdjustMultiSamples"),
-    ),
     "ImageSampleDistance": Option(
         "image_distance",
         1.0,
         "for how many pixels along each edge a ray is cast, 1 to 100",
         "The picture is interpolated linearly, as by VTK's mappers.",
         check=Number("a number from 1 to 100", 1, 100, name="the image sample distance"),
-    ),
-    "PickingOpacity": Option(
-        "picking_opacity",
-        DEFAULT_OPACITY,
-        "opacity that a ray must reach in the VDI, from its beginning on, to pick it",
-        check=checked_opacity,
     ),
     "AutoAdjustSampleDistances": Option(
         "adjust",

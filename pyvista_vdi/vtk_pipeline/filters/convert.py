@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import json
 from typing import Any
@@ -20,8 +19,7 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.io.vdi_file.layout import plain_number
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.deferred import DeferredVDI
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.vtk_pipeline import vtk
 
@@ -89,14 +87,15 @@ def volume_from_vtk(image: Any, scalars: str | None = None, preference: str = "p
         array = to_points.GetOutput().GetPointData().GetScalars()
     direction, first = image.GetDirectionMatrix(), [0.0, 0.0, 0.0]
     image.TransformIndexToPhysicalPoint(*image.GetExtent()[::2], first)
-    return Volume(
+    volume = Volume(
         as_numpy(array).reshape((*dimensions[::-1], 4) if rgba else dimensions[::-1]),
         image.GetSpacing(),
         first,
         [[direction.GetElement(i, j) for j in range(3)] for i in range(3)],
         name=name,
-        blanked=_blanked(image, of_cells),
     )
+    volume.blanked = _blanked(image, of_cells)
+    return volume
 
 
 def _blanked(image: vtk.vtkImageData, of_cells: bool) -> NDArray[np.uint8] | None:
@@ -108,8 +107,8 @@ def _blanked(image: vtk.vtkImageData, of_cells: bool) -> NDArray[np.uint8] | Non
     points, a marked cell is the point that it begins at.
     """
     own = image.GetPointData().GetArray(BLANKED)
-    blanked = None if own is None else as_numpy(own).reshape(image.GetDimensions()[::-1])
     nx, ny, nz = image.GetDimensions()
+    blanked = None if own is None else as_numpy(own).astype(np.uint8).reshape((nz, ny, nx))
     for cells, array, shape in (
         (False, image.GetPointGhostArray(), (nz, ny, nx)),
         (True, image.GetCellGhostArray(), (nz - 1, ny - 1, nx - 1)),
@@ -168,9 +167,7 @@ def scalars_of(
         for array in arrays[kind]:
             if array.GetName() == name:
                 return array
-    near = difflib.get_close_matches(str(name), [each for each in names if each], n=1)
-    hint = f"did you mean {near[0]!r}? Its" if near else "its"
-    raise UnknownArrayError(f"the volume has no array {name!r}: {hint} arrays are {names}")
+    raise UnknownArrayError(f"the volume has no array {name!r}: its arrays are {names}")
 
 
 def as_numpy(array: vtk.vtkDataArray) -> NDArray[Any]:

@@ -11,10 +11,9 @@ from pyvista_vdi.errors import InvalidArgumentError, VDIError
 from pyvista_vdi.io import checked_target, read, read_info
 from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.checks import one_of
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.packing import PRECISIONS
-from pyvista_vdi.model.vdi import picture_size
+from pyvista_vdi.model.vdi import DeferredVDI, picture_size
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     PIPELINE,
     Algorithm,

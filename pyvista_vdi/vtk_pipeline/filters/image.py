@@ -11,9 +11,8 @@ import numpy as np
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io import to_bytes
 from pyvista_vdi.model.checks import Number
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.options import FrameRequest
-from pyvista_vdi.model.vdi import VDI, picture_view
+from pyvista_vdi.model.vdi import VDI, DeferredVDI, picture_view
 from pyvista_vdi.raycasting.classified_values import classify_on_device
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
@@ -92,7 +91,15 @@ class VDIToImage(SceneAlgorithm):
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
-        vdi = self._classified(self._read(vtkImageData.GetData(inputs[0], 0)))
+        vdi = self._read(vtkImageData.GetData(inputs[0], 0))
+        if isinstance(vdi, DeferredVDI):
+            prop = self.GetVolumeProperty()
+            if prop is None:
+                raise InvalidArgumentError(
+                    "the VDI keeps values, and VDIToImage has no volume property that classifies "
+                    "them: call SetVolumeProperty"
+                )
+            vdi = classify_on_device(vdi, transfer_function_from_property(prop), self.GetDevice())
         view, size = picture_view(vdi)
         view = self.GetCamera() or view
         view = view.azimuth(self.GetAzimuth()) if self.GetAzimuth() else view
@@ -108,18 +115,6 @@ class VDIToImage(SceneAlgorithm):
         image.GetPointData().SetScalars(to_vtk("RGBA", to_bytes(bottom_first).reshape(-1, 4)))
         image.GetPointData().AddArray(to_vtk("premultiplied", bottom_first.reshape(-1, 4)))
         vtkImageData.GetData(outputs, 0).ShallowCopy(image)
-
-    def _classified(self, vdi: VDI | DeferredVDI) -> VDI:
-        """Return a VDI, or what the volume property shows of one that keeps values."""
-        if isinstance(vdi, VDI):
-            return vdi
-        prop = self.GetVolumeProperty()
-        if prop is None:
-            raise InvalidArgumentError(
-                "the VDI keeps values, and VDIToImage has no volume property that classifies them: "
-                "call SetVolumeProperty"
-            )
-        return classify_on_device(vdi, transfer_function_from_property(prop), self.GetDevice())
 
     def _read(self, image: vtkImageData) -> VDI | DeferredVDI:
         """Return the VDI; the same object as long as it is the same (it is on the device)."""

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import math
 import weakref
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     Cancelled,
     InvalidArgumentError,
+    InvalidVDIError,
     InvalidVolumeError,
-    warn_external,
 )
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import (
     GenerationOptions,
@@ -26,7 +31,7 @@ from pyvista_vdi.model.options import (
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import LightsLike
-from pyvista_vdi.model.vdi import VDI, screen_metadata
+from pyvista_vdi.model.vdi import VDI, DeferredVDI, screen_metadata
 from pyvista_vdi.model.view import bounds_corners, covering_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.targets import generate_to_target, warn_missed
@@ -38,16 +43,27 @@ from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     ask_for_all,
     named_pair,
     wanted_time,
+    watch,
 )
 from pyvista_vdi.vtk_pipeline.filters.convert import (
+    is_vdi_image,
     require_image,
     scalars_of,
     vdi_to_image,
     volume_from_vtk,
 )
+from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property
-from pyvista_vdi.vtk_pipeline.filters.view import View
-from pyvista_vdi.vtk_pipeline.vtk import vtkDataObject, vtkImageData, vtkWeakReference
+from pyvista_vdi.vtk_pipeline.filters.view import View, camera_of
+from pyvista_vdi.vtk_pipeline.vtk import (
+    vtkAlgorithmOutput,
+    vtkDataObject,
+    vtkImageData,
+    vtkWeakReference,
+)
+
+#: What two equal sizes of pixels differ by at most.
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -57,7 +73,6 @@ class Request(GenerationRequest):
     screen: View = None  # type: ignore[assignment]  # what a frame shows it in, before coverage
     target: QualityTarget | None = None
     content: Any = field(default=None, repr=False)  # equal where only the view is another
-    covered: bool = True  # as far as coverage asks
 
     @property
     def key(self) -> Any:
@@ -72,7 +87,7 @@ class Request(GenerationRequest):
         return replace(self, camera=camera, window_size=window_size, metadata=metadata)
 
 
-class VDISource(SceneAlgorithm):
+class VDISource(SceneAlgorithm, Input):
     """Generate a VDI from the volume at its input.
 
     One ``vtkImageData`` in; out comes the VDI in its canonical VTK form (see
@@ -96,6 +111,9 @@ class VDISource(SceneAlgorithm):
     """
 
     bad_input = InvalidVolumeError
+    #: Whether it is lit by whatever renderer shows it, and stands where its actor does in the world
+    #: of a camera that was given: what ``add_vdi`` adds.
+    of_scene = False
 
     SetScalars, GetScalars = accessors(
         "scalars",
@@ -111,7 +129,7 @@ class VDISource(SceneAlgorithm):
         "coverage",
         "what the VDI covers: its window, ``'view'``, or ``'bounds'``, the smallest rectangle of "
         "the screen's pixel grid that contains the whole volume (where the eye is inside its "
-        "bounds, or they reach behind it, a ``VDIWarning`` is given and the window is used)",
+        "bounds, or they reach behind it, the window)",
         "view",
         partial(one_of, name="coverage", names=("bounds", "view")),
     )
@@ -151,8 +169,11 @@ class VDISource(SceneAlgorithm):
         self._table: TransferFunction | None = None
         self._table_key: Any = None
         self._vdi: VDI | None = None
-        self._request: Request | None = None
-        self.inputs: weakref.WeakSet[Any] = weakref.WeakSet()  # mappers' inputs that draw this
+        self.made_of: Request | None = None  # what the VDI made last is of
+        self._frame_camera: Camera | None = None  # what frames gave, which nobody has set
+        self._frame_size: tuple[int, int] | None = None
+        self.drivers: weakref.WeakSet[Any] = weakref.WeakSet()
+        watch(self, self, VDISource.tell)
 
     # What is set
 
@@ -192,14 +213,6 @@ class VDISource(SceneAlgorithm):
         # VTK looks at the input's data, and nobody at lights, only where there is reason to execute
         return self._made(self._make_request(self.UpdateInput()))
 
-    def GetCurrentVDI(self) -> VDI | None:
-        """Return the VDI made last, whether up to date or not."""
-        return self._vdi
-
-    def GetCurrentRequest(self) -> Request | None:
-        """Return what the VDI made last was made of."""
-        return self._request
-
     def MakeRequest(self, view: View | None = None) -> Request:
         """Return what the next VDI would be made of, from another view if one is given.
 
@@ -211,18 +224,12 @@ class VDISource(SceneAlgorithm):
     def TakeVDI(self, vdi: VDI, request: Request) -> None:
         """Take a VDI that was made of a request elsewhere; its view is that of those to come."""
         self._set |= {"window_size": request.screen.size, "camera": request.screen.camera}
-        self._vdi, self._request = vdi, request
+        self._vdi, self.made_of = vdi, request
         self.Modified()  # the output is another
 
     def MakeVDI(self, request: Request) -> VDI:
         """Return the VDI of a request, made now; what the source has made stays."""
         self.SetAbortExecute(0)  # of this VDI nobody has said it yet
-        if not request.covered:
-            warn_external(
-                "coverage='bounds' needs the eye outside the volume, with all of it in front: the "
-                "VDI covers the current view only (coverage='view'); move the camera back and "
-                "regenerate for the whole volume"
-            )
         asked = request.replace(progress=self._advance)
         if request.target is None:
             return generate_vdi(asked)
@@ -233,21 +240,6 @@ class VDISource(SceneAlgorithm):
     def GetVolume(self) -> Volume:
         """Return the volume at the input, read again only if it has changed; raises if none is."""
         return self._read(self.UpdateInput())
-
-    def Copy(self) -> VDISource:
-        """Return another source with this one's input, settings and VDI.
-
-        The volume and its property are shared; what is set of one is not set of the other.
-        """
-        other = VDISource()
-        if self.GetNumberOfInputConnections(0) > 0:
-            other.SetInputConnection(self.GetInputConnection(0, 0))
-        other.SetVolumeProperty(self.GetVolumeProperty())
-        other.lit_by.Set(self.lit_by.Get())
-        other._set, other.placed = dict(self._set), self.placed
-        other._volume, other._volume_key = self._volume, self._volume_key
-        other._vdi, other._request = self._vdi, self._request
-        return other
 
     def UpdateInput(self) -> Any:
         """Return the data at the input, up to date and as of the time that is asked of the source.
@@ -265,7 +257,20 @@ class VDISource(SceneAlgorithm):
         self.GetInputAlgorithm(0, 0).Update()
         return self.GetInputDataObject(0, 0)
 
-    def UpdateFromInput(self, view: View | None = None) -> VDI:
+    # What a mapper draws: see Input
+
+    @property
+    def port(self) -> Any:
+        """The port that the volume comes from."""
+        connected = self.GetNumberOfInputConnections(0) > 0
+        return self.GetInputConnection(0, 0) if connected else None
+
+    @property
+    def alone(self) -> bool:
+        """Whether no other mapper draws this."""
+        return len(self.drivers) == 1
+
+    def vdi(self, view: View | None = None) -> VDI:
         """Return the VDI of the data that are at the input by now, or one of another view.
 
         They are those of before where an algorithm further up has failed, which :meth:`GetVDI`
@@ -276,10 +281,125 @@ class VDISource(SceneAlgorithm):
             self.Modified()  # the output is another
         return vdi
 
+    def exact_vdi(self, view: View) -> VDI:
+        """Make and return a VDI of exactly a view's picture.
+
+        What covers all of a volume that is near would have larger lists than that has pixels.
+        """
+        wanted = self.MakeRequest(view)
+        camera, size, lists = view.camera, view.size, wanted.window_size
+        extents = zip(wanted.camera.half_extent(lists), camera.half_extent(size), strict=True)
+        pixels = math.prod(size) * math.prod(high / low for high, low in extents)
+        if pixels > math.prod(lists) * (1 + ROUNDING):
+            wanted = wanted.seen_from(camera, size)
+        vdi = self.MakeVDI(wanted)
+        self.TakeVDI(vdi, wanted)
+        return vdi
+
+    def bounds(self) -> tuple[float, ...] | None:
+        """Return the bounds of the volume, brought up to date; ``None`` where there is none.
+
+        VTK's mappers do so, too, because many filters announce other bounds than they give.
+        """
+        data: Any = None if self.port is None else self.UpdateInput()
+        known = isinstance(data, vtkImageData) and data.GetNumberOfPoints() > 0
+        return tuple(data.GetBounds()) if known else None
+
+    def stamp(self) -> Any:
+        """Return the time stamps of all that it depends on, and a shaded volume's lights."""
+        prop, data = self.GetVolumeProperty(), None if self.port is None else self.UpdateInput()
+        stamps = [thing and thing.GetMTime() for thing in (self, data, prop)]
+        lights = self.GetLights() if prop is not None and prop.GetShade() else None
+        return *stamps, lights, self.placed if lights and lights.of_scene else None
+
+    def note_scene(self, renderers: Sequence[Any], model_transform: NDArray[np.float64]) -> None:
+        """Note a renderer that shows it, for its lights, unless none does, and where it stands."""
+        lit_by = self.lit_by.Get()
+        known = any(renderer is lit_by for renderer in renderers)
+        if self.of_scene and not known and (self.alone or lit_by is None):
+            self.lit_by.Set(renderers[0] if renderers else None)
+        if self.alone:
+            self.placed = tuple(map(tuple, model_transform.tolist()))
+
+    def keep_lights(self, closed: Sequence[Any]) -> None:
+        """Keep the lights of the renderer that lights it, if that is one of those that close."""
+        if self.of_scene and any(renderer is self.lit_by.Get() for renderer in closed):
+            self.GetLights()
+            self.lit_by.Set(None)
+
+    @property
+    def has_view(self) -> bool:
+        """Whether somebody, or a frame, has given a view to make the VDI of."""
+        return self.GetCamera() is not None and self.GetWindowSize() is not None
+
+    def view_is_chosen(self, wanted: Request | None) -> bool:
+        """Whether somebody has chosen the view: since the last VDI, or for the first one."""
+        made = self.made_of
+        if made is None or wanted is None:
+            return made is None and self.GetCamera() is not self._frame_camera
+        return bool(wanted.key != made.key and wanted.screen != made.screen)
+
+    def set_view_if_missing(
+        self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
+    ) -> None:
+        """Take a renderer's view, unless nothing can be drawn from it; this raises why not."""
+        if not self.has_view:
+            self.MakeRequest(self.view_for(camera, size, model_transform))
+        given = self.GetCamera()
+        if given is None:
+            self.take_camera(camera, model_transform)
+        elif self.of_scene and self._frame_camera is None and self.made_of is None:
+            # One that was given with the volume
+            self.SetCamera(given.replace(model_transform=model_transform))
+        if self.GetWindowSize() is None:
+            self.take_size(size)
+
+    def view_for(
+        self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
+    ) -> View:
+        """Return the view that a VDI is made of where a renderer has this one."""
+        given = self.GetCamera()
+        if given is None:
+            given = camera_of(camera, model_transform)
+        elif self.of_scene:
+            given = given.replace(model_transform=model_transform)
+        return View(given, self.GetWindowSize() or size)
+
+    def take_camera(self, camera: Any, model_transform: NDArray[np.float64]) -> None:
+        """Set a renderer's view as that of the next VDI."""
+        self.SetCamera(camera, model_transform)
+        self._frame_camera = self.GetCamera()
+
+    def take_size(self, size: tuple[int, int]) -> None:
+        """Set a renderer's window as that of the next VDI."""
+        self.SetWindowSize(size)
+        self._frame_size = self.GetWindowSize()
+
+    def follow_if_changed(
+        self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
+    ) -> None:
+        """Take a renderer's view if what the VDI was made of has changed since, the view apart.
+
+        What somebody has set, the camera or the window's size, stays.
+        """
+        made, given = self.made_of, self._frame_camera
+        if made is None or given is None or self.GetCamera() is not given:
+            return
+        if self.MakeRequest().content != made.content:
+            self.take_camera(camera, model_transform)
+            if self.GetWindowSize() == self._frame_size:
+                self.take_size(size)
+
+    def on_devices(self) -> list[Any]:
+        """Return the VDI, and the volume that it was made of."""
+        return [self._vdi, None if self.made_of is None else self.made_of.volume]
+
+    # VTK's requests
+
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Announce the output's extent: one point per list, as far as it is known before."""
         self.picture_size = self.GetWindowSize() or (1, 1)
-        made = self._request
+        made = self.made_of
         announce(outputs, self.picture_size if made is None else made.window_size)
         return 1
 
@@ -292,8 +412,8 @@ class VDISource(SceneAlgorithm):
 
     def _made(self, request: Request) -> VDI:
         """Return a request's VDI, made now unless it is the one that was made last."""
-        if self._vdi is None or self._request is None or request.key != self._request.key:
-            self._vdi, self._request = self.MakeVDI(request), request
+        if self._vdi is None or self.made_of is None or request.key != self.made_of.key:
+            self._vdi, self.made_of = self.MakeVDI(request), request
         return self._vdi
 
     def _make_request(self, image: Any, view: View | None = None) -> Request:
@@ -319,19 +439,18 @@ class VDISource(SceneAlgorithm):
         options = replace(self.GetOptions(), lights=lights)
         # Where lights of the scene shine on it, the volume is lit where it stands now
         placed = self.placed if lights.of_scene else None
-        generating, covered = (camera, window_size), True
+        generating = (camera, window_size)
         if placed is not None:
             generating = (camera.replace(model_transform=placed), window_size)
         if self.GetCoverage() == "bounds":
             # The corners of the box of points, model frame: tighter than bounds if rotated
             box = bounds_corners([end for n in volume.dimensions for end in (0, n - 1)])
             corners = np.column_stack([box, np.ones(8)]) @ volume.index_to_model.T[:, :3]
-            wide = covering_view(*generating, corners)
-            covered, generating = wide is not None, wide or generating
+            generating = covering_view(*generating, corners) or generating
         device, metadata = self.GetDevice(), {"scalars": volume.name, **self.GetMetadata()}
         content = (self._volume_key, table, options, placed, target, device, metadata)
         settings = (options, device, None, metadata, View(camera, window_size), target)
-        request = Request(volume, table, camera, window_size, *settings, content, covered)
+        request = Request(volume, table, camera, window_size, *settings, content)
         return request.seen_from(*generating)
 
     def _read(self, image: Any) -> Volume:
@@ -370,3 +489,25 @@ def _option(name: str, what: str) -> Any:
 for _told in GenerationOptions.declared.values():
     for _method in _option(_told.name, _told.what) if _told.name != "lights" else ():
         setattr(VDISource, _method.__name__, _method)
+
+
+def input_of(data: Any) -> Input:
+    """Return what to draw for a VDI, an image of one, a port, or what extensions show."""
+    if isinstance(data, vtkAlgorithmOutput):
+        producer = data.GetProducer()
+        if isinstance(producer, VDISource):
+            return producer
+        shown = Input(port=data)
+        shown.vdi()  # refuse what is no VDI now
+        return shown
+    if isinstance(data, DeferredInput | VDISource):
+        return data
+    if isinstance(data, VDI | DeferredVDI) or is_vdi_image(data):
+        return Input(as_vdi(data))  # of values this raises, and says what to do
+    show = registry.shown(data)
+    if show is not None:
+        return show(data)  # type: ignore[no-any-return]
+    raise InvalidVDIError(
+        f"a VDIMapper draws a VDI, its canonical image, a series, a set or a VDISource's output; "
+        f"got {type(data).__name__}: put a VDISource between a volume and the mapper"
+    )

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.view import View as View
-from pyvista_vdi.vtk_pipeline.vtk import vtkCamera, vtkMatrix4x4, vtkRenderer
+from pyvista_vdi.vtk_pipeline.vtk import vtkMatrix4x4, vtkRenderer
 
 #: Largest departure of a rotation from one, by rounding of its matrix.
 _RIGID = 1e-9
@@ -50,13 +50,6 @@ def aim(theirs: Any, camera: Camera, matrix: NDArray[np.float64] | None = None) 
         theirs.parallel_projection, theirs.is_set = camera.parallel_projection, True
 
 
-def camera_to_come(renderer: Any) -> Any:
-    """Return the camera of a renderer's next picture: its own, or what VTK will make and reset."""
-    if renderer.IsActiveCameraCreated():
-        return renderer.GetActiveCamera()
-    return framed(vtkCamera(), renderer, renderer.ComputeVisiblePropBounds())
-
-
 def framed(camera: Any, renderer: Any, bounds: Sequence[float]) -> Any:
     """Move a camera as the renderer's ``ResetCamera`` of these bounds would move its own."""
     scratch = vtkRenderer()
@@ -80,11 +73,6 @@ def camera_of(camera: Any, model_transform: ArrayLike | None = None) -> Camera:
     if (on_top == np.eye(4)).all():  # nearly always
         return view
     return view.replace(model_transform=on_top @ view.model_transform)
-
-
-def renderer_view(renderer: Any, model_transform: NDArray[np.float64]) -> View:
-    """Return what a renderer shows an actor from; UnsupportedError where no VDI can be."""
-    return View(camera_of(renderer.GetActiveCamera(), model_transform), size_of(renderer))
 
 
 def size_of(renderer: Any) -> tuple[int, int]:

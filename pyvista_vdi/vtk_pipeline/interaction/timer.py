@@ -8,19 +8,11 @@ from typing import Any
 
 from pyvista_vdi.vtk_pipeline.vtk import VTK_INT, calldata_type, weakly
 
-#: Milliseconds between two looks: a new VDI appears at most two frames of 30 per second late.
-PERIOD = 50
+#: Milliseconds between two looks: few, so that a series is played at whatever rate a screen has.
+PERIOD = 10
 
 #: Before other observers, whose default priority is 0: see below.
 _PRIORITY = 1.0
-
-#: Least milliseconds between two looks: timers of some systems are no finer.
-_SHORTEST = 5
-
-
-def period_of(rate: float) -> int:
-    """Return the milliseconds by which what changes so often in a second is followed."""
-    return int(min(max(_SHORTEST, 500 / rate), PERIOD))
 
 
 class Timer:
@@ -52,19 +44,17 @@ class Timer:
         self._tick = weakref.WeakMethod(tick)
         self.interactor: Callable[[], Any] = lambda: None
         self._timer = 0
-        self._period = PERIOD
         self._observers: tuple[int, ...] = ()
 
-    def start(self, interactor: Any, period: int = PERIOD) -> None:
-        """Tick every so many milliseconds, if it does not already, in this interactor."""
+    def start(self, interactor: Any) -> None:
+        """Tick, if it does not already, in this interactor."""
         if interactor is not self.interactor() or interactor is None:
             self.stop()
-        if interactor is None or (self._timer > 0 and period == self._period):
+        if interactor is None or self._timer > 0:
             return
         if not self._observers:
             self._observe(interactor)
-        self._pause()
-        self._timer, self._period = interactor.CreateRepeatingTimer(period), period
+        self._timer = interactor.CreateRepeatingTimer(PERIOD)
 
     def stop(self) -> None:
         """End: nothing is left at the interactor."""

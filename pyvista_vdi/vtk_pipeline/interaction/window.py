@@ -85,6 +85,8 @@ class Window:
 
     Attributes
     ----------
+    vtk_window : callable
+        Returns VTK's, or ``None`` where it is gone.
     number : int
         Frames of the window so far.
     pace : Pace
@@ -100,7 +102,7 @@ class Window:
         self.pace = Pace()
         self.of_frame: dict[Any, Any] = {}
         self.active = vtkWeakReference()
-        self._window = weakly(window)
+        self.vtk_window = weakly(window)
         self._renderers: dict[str, Callable[[], Any]] = {}  # that have drawn a VDI
         self._known: list[Callable[[], Any]] = []
         self._given_up: int | None = None  # the window's multisampling, in a frame without it
@@ -117,7 +119,7 @@ class Window:
         """Return that of a VTK window, made on first use."""
         address = window.GetAddressAsString("")
         found = _windows.get(address)
-        if found is None or found._window() is not window:
+        if found is None or found.vtk_window() is not window:
             found = _windows[address] = cls(window)
         return found
 
@@ -144,7 +146,7 @@ class Window:
 
     def shown(self) -> list[tuple[Any, ShownVolume]]:
         """Return the VDIs of this window, each with the renderer that shows it."""
-        window, found = self._window(), []
+        window, found = self.vtk_window(), []
         for known in self._renderers.values():
             renderer = known()
             if renderer is not None and window.HasRenderer(renderer):
@@ -160,50 +162,41 @@ class Window:
 
     def watched_behind(self, settings: Any) -> bool:
         """Whether work may go on behind the frames: somebody watches, and can move."""
-        window = self._window()
+        window = self.vtk_window()
         here = bool(window.GetShowWindow()) and window.GetInteractor() is not None
         return here or settings.off_screen
 
     def rate(self, settings: Any) -> float:
         """Return the frames per second to be kept while a hand moves, also before it does."""
         if settings.target_fps or self.moving:
-            return float(settings.target_fps or self._window().GetDesiredUpdateRate())
-        interactor = self._window().GetInteractor()
+            return float(settings.target_fps or self.vtk_window().GetDesiredUpdateRate())
+        interactor = self.vtk_window().GetInteractor()
         return _RATE if interactor is None else max(1.0, interactor.GetDesiredUpdateRate())
-
-    @property
-    def interactor(self) -> Any:
-        """VTK's, or ``None``."""
-        return self._window().GetInteractor()
 
     @property
     def moving(self) -> bool:
         """Whether a hand moves, by VTK's convention."""
-        return bool(self._window().GetDesiredUpdateRate() >= _INTERACTIVE)
+        return bool(self.vtk_window().GetDesiredUpdateRate() >= _INTERACTIVE)
 
     def previews(self, settings: Any) -> bool:
         """Whether frames may have fewer rays now: a hand moves, and somebody watches."""
         if not (settings.previews and self.moving):
             return False
-        return bool(self._window().GetShowWindow()) or settings.off_screen
+        return bool(self.vtk_window().GetShowWindow()) or settings.off_screen
 
     @property
     def whole_picture(self) -> bool:
         """Whether this frame is a whole picture by itself, and not a tile of one."""
-        window = self._window()
+        window = self.vtk_window()
         return window is None or tuple(window.GetTileScale()) == (1, 1)
 
-    def takes_picture(self, renderer: Any) -> bool:
-        """Whether this frame is drawn to be kept: such a frame is always full.
+    @property
+    def keeps_picture(self) -> bool:
+        """Whether this frame is drawn to be kept, whatever its cameras are.
 
         A screenshot draws in tiles, or with a camera of its own; an export of vector graphics has
         a helper installed.
         """
-        return self._keeps_picture or not self.knows(renderer.GetActiveCamera())
-
-    @property
-    def _keeps_picture(self) -> bool:
-        """Whether this frame is drawn to be kept, whatever its cameras are."""
         exported = vtkOpenGLGL2PSHelper.GetInstance() is not None
         return self._picture_wanted or not self.whole_picture or exported
 
@@ -223,7 +216,7 @@ class Window:
         self.of_frame.clear()
         self.number += 1
         # Between two frames only: no frame shows two generations, nor does a picture in tiles
-        window = self._window()
+        window = self.vtk_window()
         drivers = dict.fromkeys(each.driver for _, each in self.shown())
         if self.whole_picture:
             for driver in drivers:
@@ -247,15 +240,14 @@ class Window:
         shown = [(each.driver.settings, r) for r, each in self.shown() if each.visible]
         cameras = [known() for known in self._known]
         return bool(shown) and all(
-            settings.adjust_multi_samples
-            and self.previews(settings)
-            and not self._keeps_picture
+            self.previews(settings)
+            and not self.keeps_picture
             and renderer.GetActiveCamera() in cameras
             for settings, renderer in shown
         )
 
     def _end(self) -> None:
-        window = self._window()
+        window = self.vtk_window()
         given_up, self._given_up = self._given_up, None
         if given_up is not None and not window.GetMultiSamples():  # it is as it was left here
             window.SetMultiSamples(given_up)
@@ -275,7 +267,7 @@ class Window:
         ``vtkWindowToImageFilter`` puts a copy of its own in place of each renderer's camera, and
         may then take the picture that is on the screen, as ``Plotter.screenshot`` has it.
         """
-        window = self._window()
+        window = self.vtk_window()
         if not self._previewed or self._started is not None or window is None:
             return
         interactor = window.GetInteractor()

@@ -13,9 +13,9 @@ from pyvista_vdi import Shading, TransferFunction, Volume
 from pyvista_vdi.errors import Cancelled, DeviceMemoryError, UnsupportedError
 from pyvista_vdi.extensions.large.blocks import Blocks, cuts_of, with_halo
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
-from pyvista_vdi.model.deferred import lengths_of
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.options import Deferral
+from pyvista_vdi.model.vdi import lengths_of
 from pyvista_vdi.model.volume import Grid
 from pyvista_vdi.quality.targets import turned
 

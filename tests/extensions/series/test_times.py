@@ -10,7 +10,6 @@ from vtk_sources import ready_source, some_property
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.vtk_pipeline import VDIReader, VDIToImage, vdi_from_image
-from pyvista_vdi.vtk_pipeline.filters.inputs import SourceInput
 from pyvista_vdi.vtk_pipeline.vtk import (
     VTKPythonAlgorithmBase,
     vtkDataObject,
@@ -119,7 +118,7 @@ def test_each_source_keeps_its_time_whatever_others_ask_for(vdis):
     early.UpdateTimeStep(0.5)
     late.UpdateTimeStep(4.0)
     for source, step in ((early, 0), (late, 2), (early, 0)):
-        assert SourceInput(source).vdi().equals(vdis[step])
+        assert source.vdi().equals(vdis[step])
         assert time_of(source.GetOutputDataObject(0)) == TIMES[step]
     # Without a time of its own a source takes what there is
     third = source_of(producer)

@@ -38,9 +38,8 @@ from pyvista_vdi.extensions.paraview.parts.properties import (
     properties,
     view_xml,
 )
-from pyvista_vdi.model.deferred import DeferredVDI
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.vtk_pipeline.filters.algorithm import accessors, watch
 from pyvista_vdi.vtk_pipeline.filters.convert import require_image, scalars_of
 
@@ -195,7 +194,7 @@ class VDIFileWriter(vtk_pipeline.VDIWriter):
     """Writes a VDI to a file: :class:`pyvista_vdi.vtk_pipeline.VDIWriter`."""
 
     def SetPrecisionName(self, name: str) -> None:
-        """Set the precision; "usual" is that of the VDI."""
+        """Set what a supersegment takes; "usual" is that of the VDI."""
         self.SetPrecision(None if name == "usual" else name)
 
     def SetCompressionName(self, name: str) -> None:
