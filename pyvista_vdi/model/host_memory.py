@@ -17,7 +17,13 @@ def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any
     """Return an uninitialised C-contiguous array that a CPU device can use without a copy."""
     shape = (shape,) if isinstance(shape, int) else tuple(shape)
     nbytes = math.prod(shape) * np.dtype(dtype).itemsize
-    raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
+    try:
+        raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
+    except MemoryError as error:
+        raise DeviceMemoryError(
+            f"the host has no room for an array of {nbytes / 2**30:.2f} GiB: close other programs, "
+            "or use a smaller volume, window size or max_supersegments"
+        ) from error
     start = -raw.ctypes.data % HOST_ALIGNMENT
     return raw[start : start + nbytes].view(dtype).reshape(shape)
 
