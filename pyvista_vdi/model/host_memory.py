@@ -20,10 +20,8 @@ def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any
     try:
         raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
     except MemoryError as error:
-        raise DeviceMemoryError(
-            f"the host has no room for an array of {nbytes / 2**30:.2f} GiB: close other programs, "
-            "or use a smaller volume, window size or max_supersegments"
-        ) from error
+        needs = f"the host has no room for an array of {nbytes / 2**30:.2f} GiB"
+        raise DeviceMemoryError(f"{needs}: use a smaller volume or window size") from error
     start = -raw.ctypes.data % HOST_ALIGNMENT
     return raw[start : start + nbytes].view(dtype).reshape(shape)
 
