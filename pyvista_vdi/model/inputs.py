@@ -58,13 +58,12 @@ _kept: dict[int, tuple[tuple[Any, ...], Volume, weakref.ref[Any]]] = {}
 
 def _kept_volume(image: Any, scalars: str | None, preference: str) -> Volume:
     """Return the volume that a VTK image is, the same until the image is told to be modified."""
-    from_vtk = registry.method("Volume.from_vtk")
     matrix = getattr(image, "GetDirectionMatrix", None)
     made_of = (scalars, preference, image.GetMTime(), matrix and matrix().GetMTime())
     kept = _kept.get(id(image))
     if kept is not None and kept[0] == made_of:
         return kept[1]
-    volume: Volume = from_vtk(image, scalars, preference)
+    volume = Volume.from_vtk(image, scalars, preference)
     forget = functools.partial(_kept.pop, id(image), None)
     _kept[id(image)] = made_of, volume, weakref.ref(image, lambda _: forget())
     return volume

@@ -138,7 +138,7 @@ DAMAGES = {
     "no json": (described("{"), "description is damaged"),
     "no camera": (described('{"form_version": 1}'), "damaged.*camera"),
     "newer": (described({"form_version": 9}), "version 9.*update pyvista-vdi"),
-    "wrong counts": (lambda i: i["count"].fill(1), "offsets must be"),
+    "wrong counts": (lambda i: i["count"].fill(1), "the number of supersegments"),
     # Found by fuzzing: errors of NumPy and Python came out, or gigabytes were taken
     "a list": (described("[]"), "description is damaged"),
     "deep": (described("[" * 9000), "description is damaged"),

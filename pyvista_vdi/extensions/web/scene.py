@@ -35,7 +35,7 @@ from pyvista_vdi.model.whole_file import whole_file
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.frame import planes_of
-from pyvista_vdi.vtk_pipeline.filters.view import as_array, renderer_view
+from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, camera_of, size_of
 
 #: What VTK draws in the same place whatever the view.
 _FIXED = ("vtkTextActor", "vtkCornerAnnotation", "vtkScalarBarActor", "vtkLegendBoxActor")
@@ -82,7 +82,8 @@ def scene_of(plotter: Any, where: str | None, *, follow: bool = False) -> ShownS
         if is_vdi(prop):
             matrix, several, mapper = as_array(prop.GetMatrix()), prop.collection, prop.GetMapper()
             own = None if follow or mapper.GetRegenerate() == "never" else mapper.GetSource()
-            vdi = own.MakeVDI(own.MakeRequest(renderer_view(renderer, matrix))) if own else prop.vdi
+            seen = View(camera_of(renderer.GetActiveCamera(), matrix), size_of(renderer))
+            vdi = own.MakeVDI(own.MakeRequest(seen)) if own else prop.vdi
             if vdi is None:
                 continue
             placed: dict[str, Any] = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
