@@ -196,7 +196,8 @@ class Driver:
         self.follow(window)
 
     def end(self) -> None:
-        """Release the texture units."""
+        """Release the texture units, and give the box its bounds again."""
+        self.box.end()
         self._texture.let_go()
         self._no_depth.let_go()
         if self.seen is not None and self.seen.hand:
@@ -333,9 +334,8 @@ class Driver:
             return None
         # A volume has the light of its VDI in a window, so that nothing jumps
         by_vdi = self.seen is not None and source.last() is not None
-        own = not by_vdi or self.settings.draw == "volume"
-        known = {"full": planned.full, "stand_in": planned.stand_in}
-        return frame.showing(shown, lit_from=frame.view.camera if own else None, **known)
+        lit_from = frame.view.camera if not by_vdi or self.settings.draw == "volume" else None
+        return frame.showing(shown, lit_from=lit_from, full=planned.full, stand_in=planned.stand_in)
 
     def _stored(self, source: Input, frame: Frame) -> Frame | None:
         """Return the frame of a VDI that has no volume, and say what it lacks."""

@@ -30,7 +30,6 @@ def _on_start(mapper: Any, event: str) -> None:
 
 def _on_end(mapper: Any, event: str) -> None:
     mapper.driver.end()
-    mapper.driver.box.end()
 
 
 class VDIMapperMethods:
@@ -56,8 +55,7 @@ class VDIMapperMethods:
         source = self.GetSource()
         if source is None:
             raise UnsupportedError(
-                "a VDI without its volume keeps the steps that it was made of: generate another "
-                "from the volume"
+                "a VDI without its volume keeps its steps: generate another from the volume"
             )
         source.SetSampleDistance(distance)
 

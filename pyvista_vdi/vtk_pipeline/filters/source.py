@@ -315,15 +315,14 @@ class VDISource(SceneAlgorithm, Input):
     def note_scene(self, renderers: Sequence[Any], model_transform: NDArray[np.float64]) -> None:
         """Note a renderer that shows it, for its lights, unless none does, and where it stands."""
         lit_by = self.lit_by.Get()
-        known = any(renderer is lit_by for renderer in renderers)
-        if self.of_scene and not known and (self.alone or lit_by is None):
+        if self.of_scene and lit_by not in renderers and (self.alone or lit_by is None):
             self.lit_by.Set(renderers[0] if renderers else None)
         if self.alone:
             self.placed = tuple(map(tuple, model_transform.tolist()))
 
     def keep_lights(self, closed: Sequence[Any]) -> None:
         """Keep the lights of the renderer that lights it, if that is one of those that close."""
-        if self.of_scene and any(renderer is self.lit_by.Get() for renderer in closed):
+        if self.of_scene and self.lit_by.Get() in closed:
             self.GetLights()
             self.lit_by.Set(None)
 
