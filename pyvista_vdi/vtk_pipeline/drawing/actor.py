@@ -150,8 +150,7 @@ class VDIActorMethods:
 
     @opacity_multiplier.setter
     def opacity_multiplier(self: Any, multiplier: float) -> None:
-        if self._driver is not None:  # else it raises
-            self.GetMapper().SetOpacityMultiplier(multiplier)
+        self.GetMapper().SetOpacityMultiplier(multiplier)
 
     def pick(
         self: Any, x: float, y: float, opacity_threshold: float = DEFAULT_OPACITY

@@ -489,7 +489,7 @@ class Driver:
             assert trouble is not None
             raise trouble
         if planned.show == "exact":
-            return source.exact_vdi(frame.view)
+            return source.exact_vdi(frame.view, frame.full_size)
         if self._volume is None or self._volume.request.content != planned.content:
             self._volume = None  # its buffers go before others are taken
             request = source.made_of
@@ -701,7 +701,7 @@ class Driver:
         # With a volume, of a VDI that has all of what the view shows
         view, source = frame.view, self.input
         if isinstance(source, VDISource) and coverage(vdi, view.camera, view.size) < 1:
-            vdi = source.exact_vdi(view)
+            vdi = source.exact_vdi(view, view.size)
         seen = frame.showing(vdi)
         (left, bottom), request = seen.origin, FrameRequest(seen.camera, seen.size, seen.options)
         picked = pick_vdi(vdi, request, (int(x) - left, int(y) - bottom), hit, kept)

@@ -281,16 +281,16 @@ class VDISource(SceneAlgorithm, Input):
             self.Modified()  # the output is another
         return vdi
 
-    def exact_vdi(self, view: View) -> VDI:
+    def exact_vdi(self, view: View, size: tuple[int, int]) -> VDI:
         """Make and return a VDI of exactly a view's picture.
 
-        What covers all of a volume that is near would have larger lists than that has pixels.
+        What covers a volume that is near, or a tile's, would have more lists than pixels.
         """
         wanted = self.MakeRequest(view)
-        camera, size, lists = view.camera, view.size, wanted.window_size
+        camera, lists = view.camera, wanted.window_size
         extents = zip(wanted.camera.half_extent(lists), camera.half_extent(size), strict=True)
         pixels = math.prod(size) * math.prod(high / low for high, low in extents)
-        if pixels > math.prod(lists) * (1 + ROUNDING):
+        if size != view.size or pixels > math.prod(lists) * (1 + ROUNDING):
             wanted = wanted.seen_from(camera, size)
         vdi = self.MakeVDI(wanted)
         self.TakeVDI(vdi, wanted)
