@@ -131,16 +131,15 @@ inline Int grow(Growing *growing, Run sample, Real4 feature, Real length, Real t
     return grows;
 }
 
-inline Run selected_run(Run otherwise, Run then, Int condition)
-{
-#define SELECTED(component) SELECT(otherwise.component, then.component, condition)
-    return RUN(SELECTED(FRONT), SELECTED(BACK), SELECTED(TAU), SELECTED(TRANSMITTANCE),
-               SELECTED(RED), SELECTED(GREEN), SELECTED(BLUE), SELECTED(OPACITY));
-#undef SELECTED
-}
-
 inline Real4 selected_feature(Real4 otherwise, Real4 then, Int condition)
 {
     return REAL4(SELECT(otherwise.x, then.x, condition), SELECT(otherwise.y, then.y, condition),
                  SELECT(otherwise.z, then.z, condition), SELECT(otherwise.w, then.w, condition));
+}
+
+inline Run selected_run(Run otherwise, Run then, Int condition)
+{
+    const Run run = {selected_feature(otherwise.ends, then.ends, condition),
+                     selected_feature(otherwise.light, then.light, condition)};
+    return run;
 }

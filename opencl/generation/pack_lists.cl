@@ -49,6 +49,6 @@ pack_lists(const RaysOfView view, // the slice
         fronts[begin + k] = run.FRONT;
         backs[begin + k] = run.BACK;
         optical_depths[begin + k] = run.TAU;
-        vstore3(clamp(run.COLOR / run.OPACITY, 0.0f, 1.0f), begin + k, colors);
+        vstore3(clamp(run.light.xyz / run.OPACITY, 0.0f, 1.0f), begin + k, colors);
     }
 }

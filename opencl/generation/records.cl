@@ -4,104 +4,46 @@
 #include "lib/transpose.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// FRONT, BACK: t of the ray; TAU: optical depth; TRANSMITTANCE: from the eye to the front face;
-// RED, GREEN, BLUE: premultiplied by OPACITY, which is 1 - exp(-tau), accumulated.
-#if LANES == 16
+// Two vectors of four words, as they lie in a record.
 typedef struct {
-    Real FRONT, BACK, TAU, TRANSMITTANCE, RED, GREEN, BLUE, OPACITY;
+    Real4 ends, light;
 } Run;
+#define FRONT ends.x // t of the ray
+#define BACK ends.y
+#define TAU ends.z           // optical depth
+#define TRANSMITTANCE ends.w // from the eye to the front face
+#define RED light.x          // premultiplied by OPACITY
+#define GREEN light.y
+#define BLUE light.z
+#define OPACITY light.w // 1 - exp(-tau), accumulated
 #define RUN(front, back, tau, before, red, green, blue, opacity)                                   \
-    ((Run){front, back, tau, before, red, green, blue, opacity})
+    ((Run){REAL4(front, back, tau, before), REAL4(red, green, blue, opacity)})
 
-// Runs whose words begin at these places. In one load each, which a compiler may not take apart to
-// put the words where they go one by one.
-inline Run load_run_at(__global const float *records, Place *at)
+// Runs whose words begin at these places.
+inline Run load_run_at(__global const float *records, Int at)
 {
-#define ROW(n) (*(__global const volatile float8 *)(records + at[n]))
-#define ROWS(n) (Real)(ROW(n), ROW((n) + 4))
-    const Real4 low = transpose(REAL4(ROWS(0), ROWS(1), ROWS(2), ROWS(3)));
-    const Real4 high = transpose(REAL4(ROWS(8), ROWS(9), ROWS(10), ROWS(11)));
-#undef ROW
-#undef ROWS
-#define EVEN_QUARTERS(word) (Real)(low.word.s0123, low.word.s89ab, high.word.s0123, high.word.s89ab)
-#define ODD_QUARTERS(word) (Real)(low.word.s4567, low.word.scdef, high.word.s4567, high.word.scdef)
-    return RUN(EVEN_QUARTERS(x), EVEN_QUARTERS(y), EVEN_QUARTERS(z), EVEN_QUARTERS(w),
-               ODD_QUARTERS(x), ODD_QUARTERS(y), ODD_QUARTERS(z), ODD_QUARTERS(w));
-#undef EVEN_QUARTERS
-#undef ODD_QUARTERS
+    __global const float4 *fours = (__global const float4 *)records;
+    const Run run = {load_fours(fours, at >> 2), load_fours(fours + 1, at >> 2)};
+    return run;
 }
 
 // Store runs, but of rays whose place is negative.
-inline void store_run_at(__global float *records, Place *at, Run run)
+inline void store_run_at(__global float *records, Int at, Run run)
 {
-#define STORE_ROW(n, row)                                                                          \
-    if (at[n] >= 0)                                                                                \
-        vstore8((float8)(row.s0123, row.s89ab), 0, records + at[n]);                               \
-    if (at[(n) + 4] >= 0)                                                                          \
-        vstore8((float8)(row.s4567, row.scdef), 0, records + at[(n) + 4]);
-#define STORE_HALF(first, half)                                                                    \
-    {                                                                                              \
-        const Real4 rows = transpose(REAL4((Real)(run.FRONT.half, run.RED.half),                   \
-                                           (Real)(run.BACK.half, run.GREEN.half),                  \
-                                           (Real)(run.TAU.half, run.BLUE.half),                    \
-                                           (Real)(run.TRANSMITTANCE.half, run.OPACITY.half)));     \
-        STORE_ROW(first, rows.x)                                                                   \
-        STORE_ROW(first + 1, rows.y)                                                               \
-        STORE_ROW(first + 2, rows.z)                                                               \
-        STORE_ROW(first + 3, rows.w)                                                               \
-    }
-    STORE_HALF(0, lo)
-    STORE_HALF(8, hi)
-#undef STORE_HALF
-#undef STORE_ROW
+    __global float4 *fours = (__global float4 *)records;
+    store_fours(fours, at >> 2, run.ends);
+    store_fours(fours + 1, at >> 2, run.light);
 }
-#else
-// A vector, which compilers keep in registers where they put a structure into memory.
-typedef float8 Run;
-#define FRONT s0
-#define BACK s1
-#define TAU s2
-#define TRANSMITTANCE s3
-#define RED s4
-#define GREEN s5
-#define BLUE s6
-#define COLOR s456
-#define OPACITY s7
-#define RUN(front, back, tau, before, red, green, blue, opacity)                                   \
-    (float8)(front, back, tau, before, red, green, blue, opacity)
-
-// A run moves as four words of 8 bytes, because the number of loads and stores is what counts where
-// a vector's lanes go to different places.
-inline Run load_run_at(__global const float *records, Place *at)
-{
-    __global const ulong *words = (__global const ulong *)(records + at[0]);
-    return (Run)(as_float2(words[0]), as_float2(words[1]), as_float2(words[2]),
-                 as_float2(words[3]));
-}
-
-inline void store_run_at(__global float *records, Place *at, Run run)
-{
-    __global ulong *words = (__global ulong *)(records + at[0]);
-    if (at[0] < 0)
-        return;
-    words[0] = as_ulong(run.s01);
-    words[1] = as_ulong(run.s23);
-    words[2] = as_ulong(run.s45);
-    words[3] = as_ulong(run.s67);
-}
-#endif
 
 // The k-th runs from `records` on.
 inline Run load_run(__global const float *records, Int k)
 {
-    const Places places = {k * RUN_WORDS};
-    return load_run_at(records, places.each);
+    return load_run_at(records, k * RUN_WORDS);
 }
 
 inline void store_run(__global float *records, Int k, Run run)
 {
-    const Places places = {k * RUN_WORDS};
-    store_run_at(records, places.each, run);
+    store_run_at(records, k * RUN_WORDS, run);
 }
 
 // The numbers of records.

@@ -27,10 +27,10 @@ inline void measure_errors(__global const float *records, const Places *starts,
                            __global float *errors, Int counts, int most, Real per_reference,
                            float hidden_weight)
 {
-    Run run = load_run_at(records, starts->each);
+    Run run = load_run_at(records, starts->all);
     Real4 feature = run_feature(run, per_reference);
     for (int k = 0; k < most - 1; ++k) {
-        const Run next = load_run_at(records + min(k + 1, most - 1) * RUN_WORDS, starts->each);
+        const Run next = load_run_at(records + min(k + 1, most - 1) * RUN_WORDS, starts->all);
         const Real4 next_feature = run_feature(next, per_reference);
         const Int there = k + 1 < counts;
         const Real error =
@@ -70,12 +70,12 @@ inline Int merge_within(__global float *records, const Places *starts, Int count
                         Int chosen, Real per_reference, float hidden_weight)
 {
     const int most = largest_lane(counts);
-    Run run = load_run_at(records, starts->each);
+    Run run = load_run_at(records, starts->all);
     Real4 feature = run_feature(run, per_reference);
     Int kept = 0;
-    Places place = {starts->all};
+    Int place = starts->all;
     for (int k = 1; k < most; ++k) {
-        const Run next = load_run_at(records + k * RUN_WORDS, starts->each);
+        const Run next = load_run_at(records + k * RUN_WORDS, starts->all);
         const Real4 next_feature = run_feature(next, per_reference);
         const Int there = chosen & (k < counts);
         const Real error =
@@ -84,14 +84,14 @@ inline Int merge_within(__global float *records, const Places *starts, Int count
         const Int grows = there & !begins;
         // Where a run is not at its end, or a ray at its last one, it is stored for nothing
         if (ANY(begins))
-            store_run_at(records, place.each, run);
+            store_run_at(records, place, run);
         kept += COUNT(begins);
-        place.all += COUNT(begins) * RUN_WORDS;
+        place += COUNT(begins) * RUN_WORDS;
         const Run merged = merged_runs(run, next);
         run = selected_run(selected_run(run, next, begins), merged, grows);
         feature = selected_feature(run_feature(run, per_reference), next_feature, begins);
     }
-    store_run_at(records, place.each, run);
+    store_run_at(records, place, run);
     return SELECT(counts, kept + 1, chosen);
 }
 
@@ -150,8 +150,7 @@ inline Int before_of(__global const float *records, Int starts, Int k)
 
 inline Run run_of(__global const float *records, Int starts, Int k)
 {
-    const Places places = {starts + k * RUN_WORDS};
-    return load_run_at(records, places.each);
+    return load_run_at(records, starts + k * RUN_WORDS);
 }
 
 // Merge, least error first, until at most `limit` runs of each ray are left.
@@ -178,8 +177,7 @@ inline Int merge_to_limit(__global float *records, const Places *first, __global
         const Run c = run_of(records, starts, min(behind, within - 1));
         const Run d = run_of(records, starts, max(before, 0));
         const Run merged = merged_runs(a, b);
-        const Places place = {starts + at * RUN_WORDS};
-        store_run_at(records, place.each, selected_run(a, merged, chosen));
+        store_run_at(records, starts + at * RUN_WORDS, selected_run(a, merged, chosen));
         // Both its neighbours' errors change
         const Real4 feature = run_feature(merged, per_reference);
         const Real ahead = merge_error(chosen & (behind < counts), merged, feature, c,

@@ -1,9 +1,9 @@
 // The optical depth of the steps of each ray in part of a grid: the first of the two passes over a
 // volume in blocks. A ray or a block of 4 x 4 in a work-item (lib/lanes.cl).
 //
-// -D GRID_PART and those of volume/march.cl. It decides by how much an error counts, and no colour:
-// one step in `stride` is sampled, and at the faces of a block whose neighbours are not at hand the
-// last point is taken for the next.
+// -D: see volume/march.cl. It decides by how much an error counts, and no colour: one step in
+// `stride` is sampled, and at the faces of a block whose neighbours are not at hand the last point
+// is taken for the next.
 #include "volume/march.cl"
 #pragma OPENCL FP_CONTRACT OFF
 

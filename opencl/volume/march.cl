@@ -6,8 +6,7 @@
 // Every face is computed from its step's number, never accumulated.
 //
 // -D DOUBLE_FLOAT_RAYS  1: see lib/rays.cl; t counts from where the ray enters
-// -D GRID_PART          1: of a ray's steps those are marched whose midpoints lie in the part's own
-// cells Others: see volume/medium.cl. Of sixteen rays INDEX_T is uint, COMPONENTS 1, and
+// Others: see volume/medium.cl. Of sixteen rays INDEX_T is uint, COMPONENTS 1, and
 // DOUBLE_FLOAT_RAYS 0.
 #include "volume/rays_of_view.cl"
 #include "volume/medium.cl"
@@ -157,7 +156,7 @@ inline Int begin_march(March *march, const RaysOfView *view, const Classified *o
     // NaN
     march->t0 = SELECT((Real)(0.0f), march->t0, meets);
     march->t1 = SELECT((Real)(0.0f), march->t1, meets);
-    if (GRID_PART)
+    if (of->part_first.w)
         march_in_part(march, of);
     return meets;
 }
@@ -194,8 +193,7 @@ inline Int empty_steps(const March *march, const Medium *medium, Int chosen, Int
     if (!ANY(empty))
         return (Int)(0);
     const Int before = distance - 1;
-#define MACROCELL_FACE(n, axis)                                                                    \
-    TO_REAL(((n) << MACROCELL_SHIFT) + (GRID_PART ? of->part_first.axis : 0))
+#define MACROCELL_FACE(n, axis) TO_REAL(((n) << MACROCELL_SHIFT) + of->part_first.axis)
     const Int outside =
         first_step_outside(march, MACROCELL_FACE(i - before, x), MACROCELL_FACE(j - before, y),
                            MACROCELL_FACE(l - before, z), MACROCELL_FACE(i + distance, x),

@@ -4,10 +4,6 @@
 // -D BY_SCALAR  1: with NEAREST and voxels of integers, the table holds the medium of each scalar
 // from `low` on, of which no
 //               voxel is outside (volume/scalar_media.cl); 0: it is classified at each sample
-// -D GRID_PART  1: `voxels` are part of a grid (large/blocks.py). Positions stay the whole grid's,
-// so that no step is taken
-//               twice or left out; less the part's first point, which rounds nothing, they are
-//               sampled
 // -D VOXEL_T, INDEX_T, COMPONENTS, NEAREST: see volume/sampling.cl; SHADED: see volume/shading.cl
 #include "lib/transpose.cl"
 #include "lib/classification.cl"
@@ -19,7 +15,7 @@
 typedef struct {
     Points points;
     int4 macrocells; // along x, y, z
-    int4 part_first; // the first point of a part of a grid
+    int4 part_first; // the first point of a part of a grid (large/blocks.py); w: whether it is one
     float4 part_lower,
         part_upper;        // of its own cells, the upper ones excluded; infinite at the grid's ends
     int4 nodes;            // of ambient occlusion, along x, y, z
@@ -49,9 +45,9 @@ typedef struct {
 #define MEDIUM_OF_PARAMETERS                                                                       \
     {classified, voxels, table, distances, blanked, gradient, lighting, ambient}
 
-// An index position of the grid in the part of it that is at hand.
-#define IN_PART(numbers, position, axis)                                                           \
-    (GRID_PART ? (position) - (float)(numbers).part_first.axis : (position))
+// An index position of the grid in the part of it that is at hand, which rounds nothing. Marches
+// keep the whole grid's, so that no step is taken twice or left out.
+#define IN_PART(numbers, position, axis) ((position) - (float)(numbers).part_first.axis)
 
 // Trilinear between (0, 0, 0) and (1, 1, 1) of eight values, `row` and `plane` apart.
 inline Real trilinear(__global const float *values, Int first, int row, int plane, Real fx, Real fy,

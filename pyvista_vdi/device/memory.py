@@ -304,7 +304,7 @@ class Memory(Turns):
         with self._ledger:
             free = self._pinned.setdefault(size, [])
             if not free and self._pinned_bytes + size > PINNED_BYTES:
-                return np.empty(shape, dtype)
+                return aligned_empty(shape, dtype)
             try:
                 if not free:
                     flags = cl.mem_flags.READ_WRITE | cl.mem_flags.ALLOC_HOST_PTR
@@ -313,7 +313,7 @@ class Memory(Turns):
                     free.append((block, cl.enqueue_map_buffer(*place)[0]))
                     self._pinned_bytes += size
             except cl.Error:
-                return np.empty(shape, dtype)
+                return aligned_empty(shape, dtype)
             block, mapped = free.pop()
         # Views have this array as their base, so that it lives as long as they do
         array = np.frombuffer(memoryview(mapped)[:nbytes], dtype)
@@ -332,7 +332,7 @@ class Memory(Turns):
         if out is None:
             waits = self.thread.worker is None
             pins = waits and not self.is_cpu and buffer.nbytes >= LEAST_PINNED
-            out = (self.pinned if pins else np.empty)(buffer.shape, buffer.dtype)
+            out = (self.pinned if pins else aligned_empty)(buffer.shape, buffer.dtype)
         if buffer.host is None or out.ctypes.data != buffer.host.ctypes.data:
             self._copy(buffer, out, to_host=True)
         elif out.nbytes:

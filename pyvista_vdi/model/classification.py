@@ -168,8 +168,7 @@ class Classification(Look, ArrayChoice):
         if given:
             raise InvalidArgumentError(
                 f"classification='deferred' keeps values, whatever their look: give "
-                f"{', '.join(sorted(given))} to classified() of what is returned, where all but "
-                "shade can be had, which needs gradients"
+                f"{', '.join(sorted(given))} to classified() of what is returned, but for shade"
             )
 
     def transfer_function_of(self, volume: Volume) -> TransferFunction:

@@ -17,7 +17,11 @@ def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any
     """Return an uninitialised C-contiguous array that a CPU device can use without a copy."""
     shape = (shape,) if isinstance(shape, int) else tuple(shape)
     nbytes = math.prod(shape) * np.dtype(dtype).itemsize
-    raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
+    try:
+        raw = np.empty(nbytes + HOST_ALIGNMENT, np.uint8)
+    except MemoryError as error:
+        needs = f"the host has no room for an array of {nbytes / 2**30:.2f} GiB"
+        raise DeviceMemoryError(f"{needs}: use a smaller volume or window size") from error
     start = -raw.ctypes.data % HOST_ALIGNMENT
     return raw[start : start + nbytes].view(dtype).reshape(shape)
 

@@ -117,9 +117,8 @@ def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
     camera = Camera.from_any(camera)
     to_view, box = camera.model_to_view, _homogeneous(bounds_corners(vdi.bounds))
     u, v, _, w = camera.viewport_matrix(window_size) @ to_view @ box
-    before = w > 0
     across = np.linspace(-1.0, 1.0, _RAYS)
-    corners = np.stack([u[before], v[before]]) / w[before]
+    corners = np.stack([u, v])[:, w > 0] / w[w > 0]
     places = np.hstack([np.stack(np.meshgrid(across, across)).reshape(2, -1), corners])
     places = places[:, (np.abs(places) <= 1).all(axis=0)]
     # Points and directions in view space, taken to the model frame
@@ -138,9 +137,8 @@ def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
         first = np.maximum(first, 0.0)
     meets = last > first
     near, far = (origins[:, meets] + t[meets] * directions[:, meets] for t in (first, last))
-    if not meets.any():
-        return 1.0
-    return float((_in_window(to_lists, near.T) & _in_window(to_lists, far.T)).mean())
+    held = _in_window(to_lists, near.T) & _in_window(to_lists, far.T) if meets.any() else [True]
+    return float(np.mean(held))
 
 
 def nearest_depth(grid: Grid, camera: Camera, window_size: Sequence[int]) -> float | None:

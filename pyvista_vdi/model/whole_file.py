@@ -30,9 +30,8 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     except BaseException as error:
         temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise VDIFileError(
-                f"{target} could not be written: {error.strerror or error}"
-            ) from error
+            why = error.strerror or error
+            raise VDIFileError(f"{target} could not be written: {why}") from error
         raise
 
 

@@ -121,7 +121,6 @@ class DeviceVolume:
             voxels.variant,
             nearest=nearest,
             by_scalar=table.by_scalar,
-            part=part is not None,
             compensated=summation(media),
             **shading,
         )
@@ -298,7 +297,7 @@ def _numbers(
         "size": size,
         "held": size,
         "macrocells": (*macrocells_over(volume.dimensions), 0),
-        "part_first": (0,) * 4 if part is None else (*part.first, 0),
+        "part_first": (0,) * 4 if part is None else (*part.first, 1),
         "part_lower": infinite if part is None else (*part.lower, 0),
         "part_upper": infinite if part is None else (*part.upper, 0),
         "nodes": nodes,

@@ -136,11 +136,10 @@ class Variant:
     OpenCL's types of a voxel's component (``voxel``) and of a voxel's address (``index``); a
     scalar, or colours and a scalar (1 or 4 ``components``); whether the ``nearest`` point is
     sampled, and the medium of its scalar looked up (``by_scalar``). Samples are not lit, lit, or
-    lit by one headlight and nothing else (``shaded`` 0, 1, 2);
-    voxels may be ``part`` of a grid. With ``double_float``, rays enter the volume so far from where
-    they are formed that float32 does not hold it. ``compensated``: how sums along a ray are kept
-    (``lib/compositing.cl``). ``sharp``, no ``-D`` option: a specular power is so large that cosines
-    round it off.
+    lit by one headlight and nothing else (``shaded`` 0, 1, 2). With ``double_float``, rays enter
+    the volume so far from where they are formed that float32 does not hold it. ``compensated``: how
+    sums along a ray are kept (``lib/compositing.cl``). ``sharp``, no ``-D`` option: a specular
+    power is so large that cosines round it off.
     """
 
     voxel: str = "uchar"
@@ -149,7 +148,6 @@ class Variant:
     nearest: bool = False
     by_scalar: bool = False
     shaded: int = 0
-    part: bool = False
     double_float: bool = False
     compensated: int = 0
     sharp: bool = False
@@ -164,7 +162,6 @@ class Variant:
             "NEAREST": self.nearest,
             "BY_SCALAR": self.by_scalar,
             "SHADED": self.shaded,
-            "GRID_PART": self.part,
             "DOUBLE_FLOAT_RAYS": self.double_float,
             "COMPENSATED": self.compensated,
         }

@@ -100,6 +100,8 @@ def test_too_large_a_buffer_is_refused_before_it_is_taken(small):
     for array in (np.zeros(2**19), aligned_empty(2**19, np.float64)):
         with pytest.raises(DeviceMemoryError, match="'volume' needs 4.00 MiB"):
             small.upload(array, name="volume")
+    with pytest.raises(DeviceMemoryError, match=r"no room for an array of 1073741824.00 GiB"):
+        aligned_empty(2**60, np.uint8)
     with small.buffer((2**18,), name="one"), small.buffer((2**18 - 1,), name="two"):
         with pytest.raises(DeviceMemoryError, match=r"'three' needs .* are in use: release"):
             small.buffer((2,), name="three")

@@ -2,20 +2,22 @@
 #include "generation/homogeneity.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-__kernel void merged(int count, __global const float8 *a, __global const float8 *b, __global float8 *results)
+__kernel void merged(int count, __global const float *first, __global const float *second, __global float *results)
 {
     const int i = get_global_id(0);
     if (i < count)
-        results[i] = merged_runs(a[i], b[i]);
+        store_run(results, i, merged_runs(load_run(first, i), load_run(second, i)));
 }
 
-__kernel void merge_errors(int count, __global const float8 *a, __global const float8 *b, float per_reference,
+__kernel void merge_errors(int count, __global const float *first, __global const float *second, float per_reference,
                            float hidden_weight, __global float *results)
 {
     const int i = get_global_id(0);
-    if (i < count)
-        results[i] = merge_error(1, a[i], run_feature(a[i], per_reference), b[i], run_feature(b[i], per_reference),
-                                 per_reference, hidden_weight);
+    if (i >= count)
+        return;
+    const Run a = load_run(first, i), b = load_run(second, i);
+    results[i] = merge_error(1, a, run_feature(a, per_reference), b, run_feature(b, per_reference), per_reference,
+                             hidden_weight);
 }
 
 #define WITHIN 0
@@ -25,7 +27,7 @@ __kernel void merge_errors(int count, __global const float8 *a, __global const f
 
 // Shorten record i by one of these; `runs` are in (record, k) order, before and after.
 __kernel void shortened(int count, int way, int limit, int capacity, float per_reference, float hidden_weight,
-                        __global float8 *runs, __global int *lengths, __global float *thresholds,
+                        __global float *runs, __global int *lengths, __global float *thresholds,
                         __global float *records, __global float *all_errors)
 {
     const int i = get_global_id(0);
@@ -34,7 +36,7 @@ __kernel void shortened(int count, int way, int limit, int capacity, float per_r
     __global float *record = records + record_start((uint)i, capacity);
     int n = lengths[i];
     for (int k = 0; k < n; ++k)
-        store_run(record, k, runs[(size_t)i * capacity + k]);
+        store_run(record, k, load_run(runs, i * capacity + k));
     __global float *errors = all_errors + errors_start((uint)i, capacity);
     const Places starts = {0};
     float threshold = thresholds[i];
@@ -49,5 +51,5 @@ __kernel void shortened(int count, int way, int limit, int capacity, float per_r
     thresholds[i] = threshold;
     lengths[i] = n;
     for (int k = 0; k < n; ++k)
-        runs[(size_t)i * capacity + k] = load_run(record, k);
+        store_run(runs, i * capacity + k, load_run(record, k));
 }

@@ -34,7 +34,7 @@ SHADED = {"shading": Shading(0.2, 0.7, 0.4, 8.0)}
         ("march_lists", "uint8", "nearest", "parallel", PLAIN, False, {"criterion": "homogeneity"}),
         ("shorten_lists", "uint8", "nearest", "along an axis", PLAIN, True, {"tolerance": 0.05}),
         ("shorten_lists", "uint8", "nearest", "parallel", PLAIN, False, {"max_supersegments": 5}),
-        ("render_volume", "uint8", "linear", "all of it", PLAIN, False, CROPPED | DEPTH),
+        ("render_volume", "float32", "linear", "all of it", PLAIN, False, CROPPED | DEPTH),
         ("render_volume", "float32", "linear", "parallel", SHADED | GRADIENT, True, PLANES | LAMP),
         ("render_volume", "float32", "linear", "parallel", PLAIN, False, FINE),
     ],

@@ -90,7 +90,6 @@ def test_in_the_volume_the_finest_and_past_it_the_coarsest():
     assert required_level(LEVELS, inside, (9, 9)) == 0
     away = FROM_TEN.replace(focal_point=(0, 0, 20))
     assert required_level(LEVELS, away, (9000, 9000)) == 3
-    # Of a plate on edge, thinner than the window by far, what is in view decides as well
     plate = [Grid((n + 1, n + 1, 2), (8 / n, 8 / n, 0.01), (-4, -4, 0), np.eye(3)) for n in (64, 8)]
     across = Camera((0, -10, 0.005), (0, 0, 0.2), (0, 0, 1), view_angle=20)
     assert required_level(plate, across, (1000, 1000)) == 0

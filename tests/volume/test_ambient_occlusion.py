@@ -41,7 +41,7 @@ def homogeneous(opacity, unit_distance=1.0):
 
 def test_inside_a_homogeneous_medium_it_is_the_transmittance_of_the_radius(runtime):
     """exp(-sigma R), whatever the direction; an actor's matrix has no part in it."""
-    volume = Volume(np.zeros((33, 33, 33), np.uint8), spacing=(0.5, 0.5, 0.5))
+    volume = Volume(np.zeros((33, 33, 33), np.int16), spacing=(0.5, 0.5, 0.5))
     function, radius = homogeneous(0.3, unit_distance=2.0), 4.0
     expected = 0.7 ** (radius / 2)
     occlusion = AmbientOcclusion(radius)

@@ -92,7 +92,7 @@ def case(seed, dtype="float32", **more):
         ("dimmed headlight", "int32", "linear", False, False),
         ("positional headlight", "float64", "linear", False, True),
         ("none", "float32", "linear", False, False),
-        (None, "uint8", "linear", True, True),  # without shading
+        (None, "int16", "linear", True, True),  # without shading
     ],
 )
 def test_pictures_are_the_reference_s(runtime, name, dtype, interpolation, gradient, blanked):

@@ -67,7 +67,7 @@ def test_step_optical_depth(call):
     assert found[4] == pytest.approx(24 * np.log(2) * units[4], rel=6 * EPS)
 
 
-@pytest.mark.parametrize("lanes", [1, 16])
+@pytest.mark.parametrize("lanes", [{}, {"LANES": 16}], ids=["1", "16"])
 def test_opacity_of_optical_depth(call, lanes):
     """Of random numbers of every exponent, and where the polynomial's pieces meet."""
     rng = np.random.default_rng(8)
@@ -78,7 +78,9 @@ def test_opacity_of_optical_depth(call, lanes):
     ends = [0, 1e-45, 1.1754942e-38, 1, 17, 30, 32, 1e3, 3.4e38, np.inf]
     tau = np.abs(np.concatenate([tau, *edges, ends]).astype(np.float32))
     tau = np.append(tau, np.zeros(-len(tau) % 16, np.float32))
-    found = call(FILE, "opacities", len(tau) // lanes, tau, call.empty(len(tau)), LANES=lanes)
+    found = call(
+        FILE, "opacities", len(tau) // lanes.get("LANES", 1), tau, call.empty(len(tau)), **lanes
+    )
     exact = -np.expm1(-tau.astype(np.float64))
     # Half an ulp of the result, the polynomial's 1.4e-8 and a rounding of what it is added to:
     # .97 ulp was found among a million of each exponent. 1 - exp(-tau) would lose all of it
