@@ -99,8 +99,7 @@ LOOKUP = f"""//VTK::System::Dec
 //VTK::Output::Dec
 vec4 g_fragColor = vec4(0.0);
 uniform sampler2D vdiImage;
-uniform float in_scale;
-uniform float in_bias;
+uniform float in_scale, in_bias;
 //VTK::Picking::Dec
 //VTK::DepthPeeling::Dec
 #define vdiImage vdiImageUnit
