@@ -17,7 +17,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.quality.costs import RenderMode
 from pyvista_vdi.quality.view_error import angle_from_generating_view
-from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, renderer_view, size_of
+from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, camera_of, size_of
 from pyvista_vdi.vtk_pipeline.interaction.window import Window
 
 Matrix = NDArray[np.float64]
@@ -92,7 +92,7 @@ class Frame:
         camera = Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), model_transform=to_view @ matrix, **lens)
         size = (width, height)
         try:
-            view = renderer_view(renderer, matrix)
+            view = View(camera_of(vtk_camera, matrix), size_of(renderer))
         except UnsupportedError:  # a shear, an off-axis projection: drawn all the same
             view = View(camera, size)
         of = (renderer, Window.of(renderer.GetRenderWindow()), actor, mapper, size, view, matrix)

@@ -75,11 +75,6 @@ def camera_of(camera: Any, model_transform: ArrayLike | None = None) -> Camera:
     return view.replace(model_transform=on_top @ view.model_transform)
 
 
-def renderer_view(renderer: Any, model_transform: NDArray[np.float64]) -> View:
-    """Return what a renderer shows an actor from; UnsupportedError where no VDI can be."""
-    return View(camera_of(renderer.GetActiveCamera(), model_transform), size_of(renderer))
-
-
 def size_of(renderer: Any) -> tuple[int, int]:
     """Return width and height of a renderer's picture in pixels, at least 1."""
     width, height = renderer.GetSize()
