@@ -232,7 +232,7 @@ def test_magnification(old, new, size, expected):
         (SMALL, PARALLEL, 1.0),
         (SMALL.replace(window_center=(1.0, 0.0)), PARALLEL, 0.5),  # its left half lies outside
         (SMALL.replace(parallel_scale=0.5), SMALL, 0.25),
-        (PARALLEL, PARALLEL.replace(focal_point=(0, -20, 0)), 1.0),  # nothing in view
+        (SMALL.replace(parallel_scale=0.5), FRONT.replace(focal_point=(0, -20, 0)), 1.0),  # nothing
     ],
 )
 def test_coverage_is_the_share_of_the_rays_that_the_vdi_has(old, new, share):
