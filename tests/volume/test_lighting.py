@@ -8,13 +8,7 @@ import reference
 import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
 
-from pyvista_vdi import (
-    Light,
-    Lights,
-    Shading,
-    TransferFunction,
-    Volume,
-)
+from pyvista_vdi import Light, Lights, Shading, TransferFunction, Volume
 
 WINDOW = (7, 6)
 PLACE = ("spacing", "origin", "direction")
