@@ -7,7 +7,7 @@ such as ambient occlusion" (section 2). Computed is docs/dev/conventions.md, "Am
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -85,10 +85,6 @@ class AmbientOcclusion:
     def radius_in(self, volume: Grid) -> float:
         """Return the radius in a volume, model units; beyond its diagonal nothing occludes."""
         return min(0.05 * volume.length if self.radius is None else self.radius, volume.length)
-
-    def to_dict(self, volume: Grid) -> dict[str, Any]:
-        """Return what can be written to JSON, with the radius in this volume."""
-        return {**asdict(self), "radius": self.radius_in(volume)}
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,6 @@ Vector: TypeAlias = Sequence[float] | NDArray[Any]
 #: Largest width or height of a window, in pixels: four times 16k, far beyond any display.
 MAX_WINDOW_EDGE = 65536
 
-#: Arguments of a camera that are vectors, and their lengths.
-_VECTORS = {"position": 3, "focal_point": 3, "view_up": 3, "window_center": 2}
-
 
 def check_window_size(window_size: Sequence[int], *, name: str = "window_size") -> tuple[int, int]:
     """Return width and height in pixels as two Python ints; ``name`` is for errors."""
@@ -90,7 +87,8 @@ class Camera:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        for name, length in _VECTORS.items():
+        lengths = {"position": 3, "focal_point": 3, "view_up": 3, "window_center": 2}
+        for name, length in lengths.items():
             put(self, name, as_vector(getattr(self, name), name, length, InvalidCameraError))
         for name in ("parallel_projection", "use_horizontal_view_angle"):
             put(self, name, as_flag(getattr(self, name), name))
@@ -159,9 +157,7 @@ class Camera:
         """
         return registry.method("Camera.to_pyvista")(self)
 
-    def replace(self, **changes: Any) -> Camera:
-        """Return a copy with some arguments of the constructor changed."""
-        return replace(self, **changes)
+    replace = replace
 
     def azimuth(self, degrees: float) -> Camera:
         """Return the view turned about ``view_up`` through the focal point (as VTK's Azimuth)."""

@@ -63,7 +63,7 @@ def _kept_volume(image: Any, scalars: str | None, preference: str) -> Volume:
     kept = _kept.get(id(image))
     if kept is not None and kept[0] == made_of:
         return kept[1]
-    volume = Volume.from_vtk(image, scalars, preference)
+    volume: Volume = registry.method("Volume.from_vtk")(image, scalars, preference)
     forget = functools.partial(_kept.pop, id(image), None)
     _kept[id(image)] = made_of, volume, weakref.ref(image, lambda _: forget())
     return volume

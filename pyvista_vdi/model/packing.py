@@ -61,18 +61,11 @@ class Arrays(NamedTuple):
         return Arrays(offsets.astype(np.uint64, copy=False), *(array[rows] for array in self[1:]))
 
 
-class Codes(NamedTuple):
-    """What the two words of a supersegment hold, uint32 (n,) each; colours in bits 8 to 31."""
-
-    front: NDArray[np.uint32]
-    back: NDArray[np.uint32]
-    tau: NDArray[np.uint32]
-    color: NDArray[np.uint32]
-
-    def words(self) -> NDArray[np.uint32]:
-        """Return the words, uint32 (n, 2)."""
-        low = self.front | self.back << np.uint32(14) | self.tau << np.uint32(28)
-        return np.stack([low, self.tau >> np.uint32(4) | self.color], axis=1)
+def words_of(*codes: Any) -> NDArray[np.uint32]:
+    """Return the words, uint32 (n, 2), of codes as :meth:`Packed8.codes` returns them."""
+    front, back, tau, color = codes
+    low = front | back << np.uint32(14) | tau << np.uint32(28)
+    return np.stack([low, tau >> np.uint32(4) | color], axis=1)
 
 
 @dataclass(frozen=True)
@@ -101,12 +94,12 @@ class Packed8:
         """Bytes beside the VDI's own arrays."""
         return self.origins.nbytes + self.strides.nbytes + self.words.nbytes
 
-    def codes(self, rows: slice | NDArray[np.int64]) -> Codes:
-        """Return the codes of some supersegments."""
+    def codes(self, rows: slice | NDArray[np.int64]) -> tuple[NDArray[np.uint32], ...]:
+        """Return the codes of some supersegments: front, back, tau, colour in bits 8 to 31."""
         low, high = self.words[rows].T
         mask = np.uint32(DEPTH_CODES)
         tau = low >> np.uint32(28) | (high & np.uint32(0xFF)) << np.uint32(4)
-        return Codes(low & mask, low >> np.uint32(14) & mask, tau, high & np.uint32(0xFFFFFF00))
+        return low & mask, low >> np.uint32(14) & mask, tau, high & np.uint32(0xFFFFFF00)
 
     def arrays(self) -> Arrays:
         """Return the values that it stands for."""
@@ -114,13 +107,13 @@ class Packed8:
         front, back, tau = (aligned_empty(n, np.float32) for _ in range(3))
         color, bits_of_color = aligned_empty((n, 3), np.float32), np.array(_COLOR_BITS, np.uint32)
         for lists, part in _pieces(counts):
-            codes = self.codes(part)
+            *faces, tau_codes, colors = self.codes(part)
             own = np.repeat(np.arange(lists.start, lists.stop), counts[lists])
-            front[part], back[part] = (self.depths(own, code) for code in codes[:2])
-            bits = np.where(codes.tau > 0, codes.tau + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
+            front[part], back[part] = (self.depths(own, face) for face in faces)
+            bits = np.where(tau_codes > 0, tau_codes + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
             tau[part] = bits.astype(np.uint32).view(np.float32)
             # One multiplication, which every device rounds alike
-            steps = codes.color[:, np.newaxis] >> bits_of_color & np.uint32(_COLOR_STEPS)
+            steps = colors[:, np.newaxis] >> bits_of_color & np.uint32(_COLOR_STEPS)
             color[part] = steps.astype(np.float32) * (np.float32(1) / np.float32(_COLOR_STEPS))
         return Arrays(self.offsets, front, back, color, tau)
 
@@ -160,7 +153,7 @@ def packing_of(arrays: Arrays, nearest: float) -> Packed8:
         codes = np.where(tau < _LEAST_TAU, 0, np.clip(upper - TAU_BASE + 1, 1, TAU_CODES))
         steps = np.rint(arrays.color[part] * np.float32(_COLOR_STEPS)).astype(np.uint32)
         red, green, blue = (steps << np.array(_COLOR_BITS, np.uint32)).T
-        words[part] = Codes(front, back, codes.astype(np.uint32), red | green | blue).words()
+        words[part] = words_of(front, back, codes.astype(np.uint32), red | green | blue)
     return Packed8(step, arrays.offsets, origins, strides, words)
 
 
