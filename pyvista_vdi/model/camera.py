@@ -94,7 +94,24 @@ class Camera:
             put(self, name, as_flag(getattr(self, name), name))
         put(self, "view_angle", as_float(self.view_angle))
         put(self, "parallel_scale", as_float(self.parallel_scale))
-        put(self, "model_transform", _affine(self.model_transform))
+        given = self.model_transform
+        matrix = np.eye(4) if given is None else as_floats(given)
+        finite = matrix.shape == (4, 4) and np.isfinite(matrix).all()
+        if not finite or not np.array_equal(matrix[3], [0, 0, 0, 1]):
+            raise InvalidCameraError(
+                "model_transform must be 4 x 4 finite numbers, affine: with a last row of 0 0 0 1; "
+                f"got {given!r}"
+            )
+        # Scale-free: the determinant against the product of the column lengths (Hadamard's bound)
+        columns = np.abs(matrix[:3, :3]).max(axis=0)  # first, because squares may overflow
+        if columns.all():
+            columns *= np.linalg.norm(matrix[:3, :3] / columns, axis=0)
+        if not columns.all() or abs(np.linalg.det(matrix[:3, :3] / columns)) < 1e-12:
+            raise InvalidCameraError(
+                f"model_transform cannot be inverted: it flattens space; got {given!r}"
+            )
+        matrix.setflags(write=False)
+        put(self, "model_transform", matrix)
         put(self, "_transform", self.model_transform.tobytes())
         _ = self.axes  # which refuses what makes no view
 
@@ -305,29 +322,6 @@ class Camera:
         turned = arm * math.cos(angle) + _cross(axis, arm) * math.sin(angle)
         turned = turned + axis * (axis @ arm) * (1 - math.cos(angle))
         return self.replace(position=np.asarray(self.focal_point) + turned)
-
-
-def _affine(value: ArrayLike | None) -> Matrix:
-    matrix = np.eye(4) if value is None else as_floats(value)
-    if (
-        matrix.shape != (4, 4)
-        or not np.isfinite(matrix).all()
-        or not np.array_equal(matrix[3], [0, 0, 0, 1])
-    ):
-        raise InvalidCameraError(
-            "model_transform must be 4 x 4 finite numbers, affine: with a last row of 0 0 0 1; "
-            f"got {value!r}"
-        )
-    # Scale-free: the determinant against the product of the column lengths (Hadamard's bound)
-    columns = np.abs(matrix[:3, :3]).max(axis=0)  # first, because squares may overflow
-    if columns.all():
-        columns *= np.linalg.norm(matrix[:3, :3] / columns, axis=0)
-    if not columns.all() or abs(np.linalg.det(matrix[:3, :3] / columns)) < 1e-12:
-        raise InvalidCameraError(
-            f"model_transform cannot be inverted: it flattens space; got {value!r}"
-        )
-    matrix.setflags(write=False)
-    return matrix
 
 
 def _unit(vector: Matrix) -> Matrix:

@@ -98,9 +98,17 @@ class Cropping:
         if hasattr(cropping, "GetCroppingRegionFlags"):
             if not cropping.GetCropping():
                 return None
-            planes, normals = _of_image(
-                cropping.GetCroppingRegionPlanes(), cropping.GetDataSetInput()
-            )
+            planes, image = cropping.GetCroppingRegionPlanes(), cropping.GetDataSetInput()
+            normals: Any = _AXES
+            matrix = image.GetDirectionMatrix() if hasattr(image, "GetDirectionMatrix") else None
+            if matrix is not None and not matrix.IsIdentity():
+                # VTK's GPU mapper puts the planes' places into the image's bounds, takes each as a
+                # point on its axis of the model frame, and cuts across the image's axis there
+                elements = [[matrix.GetElement(i, j) for j in range(3)] for i in range(3)]
+                normals = np.linalg.inv(np.array(elements))
+                low, high = np.reshape(image.GetBounds(), (3, 2)).T[..., None]
+                planes = np.clip(np.reshape(planes, (3, 2)), low, high) * np.diag(normals)[:, None]
+                planes = planes.ravel()
             return cls(planes, cropping.GetCroppingRegionFlags(), normals)
         try:
             parts = list(cropping)
@@ -157,19 +165,3 @@ class Cropping:
         if (there & ~kept)[covered].any():
             return cuts, None
         return cuts, np.stack([borders[range(3), first], borders[range(3), last]], axis=1)
-
-
-def _of_image(planes: Sequence[float], image: Any) -> tuple[Any, Any]:
-    """Return planes and normals as VTK's GPU mapper has them for an image.
-
-    It puts the planes' places into the image's bounds, takes each as a point on its axis of the
-    model frame, and cuts across the image's axis where that point lies along it.
-    """
-    matrix = image.GetDirectionMatrix() if hasattr(image, "GetDirectionMatrix") else None
-    if matrix is None or matrix.IsIdentity():
-        return planes, _AXES
-    normals = np.array([[matrix.GetElement(i, j) for j in range(3)] for i in range(3)])
-    normals = np.linalg.inv(normals)
-    low, high = np.reshape(image.GetBounds(), (3, 2)).T[..., None]
-    places = np.clip(np.reshape(planes, (3, 2)), low, high) * np.diag(normals)[:, None]
-    return places.ravel(), normals

@@ -87,7 +87,6 @@ class Packed8:
     origins: NDArray[np.int32]
     strides: NDArray[np.uint16]
     words: NDArray[np.uint32]
-    precision = "8-byte"
 
     @property
     def nbytes(self) -> int:
@@ -145,7 +144,26 @@ def packing_of(arrays: Arrays, nearest: float) -> Packed8:
         # Whole steps, exactly: a division by a power of two; what is before the eye stays there
         faces = np.stack([arrays.front[part], arrays.back[part]], axis=1).astype(np.float64) / step
         np.maximum(faces, np.ceil(max(nearest / step, -(2.0**30))), out=faces)
-        origins[lists], strides[lists], front, back = _depth_codes(faces, counts[lists])
+        # Each list's codes begin at its first front, and are as fine as its extent allows
+        occupied = lists.start + np.flatnonzero(counts[lists])
+        lengths = counts[occupied]
+        first = np.cumsum(lengths) - lengths
+        origin = np.rint(faces[first, 0])
+        span = np.rint(faces[first + lengths - 1, 1]) - origin
+        stride = np.maximum(1, np.ceil(span / DEPTH_CODES))
+        origins[occupied], strides[occupied] = origin, stride
+        own = np.repeat(np.arange(len(occupied)), lengths)
+        depths = np.rint((faces - origin[own, np.newaxis]) / stride[own, np.newaxis])
+        # Keep every back at least 1 behind its front. Rounding keeps faces in order; what it made
+        # equal is moved behind, and where no codes are left behind, before. Less the thicknesses
+        # that must lie before it, a face may equal the one before it
+        within = np.arange(len(depths)) - first[own]
+        needed = np.stack([within, within + 1], axis=1)
+        slack = np.maximum(depths.astype(np.int64), 0) - needed
+        apart = own[:, np.newaxis] << 20  # no list's maximum reaches the next list
+        running = np.maximum.accumulate((slack + apart).reshape(-1)).reshape(-1, 2) - apart
+        most = DEPTH_CODES - lengths[own]
+        front, back = (np.minimum(running, most[:, np.newaxis]) + needed).astype(np.uint32).T
         # Round optical depths to eight significant bits, ties to even, between 2^-18 and 16256
         tau = arrays.optical_depth[part]
         bits = tau.view(np.uint32).astype(np.int64)
@@ -166,34 +184,3 @@ def _pieces(counts: NDArray[np.int64]) -> Iterator[tuple[slice, slice]]:
         last = int(ends[last_list - 1])
         yield slice(first_list, last_list), slice(first, last)
         first_list, first = last_list, last
-
-
-def _depth_codes(
-    faces: NDArray[np.float64], counts: NDArray[np.int64]
-) -> tuple[NDArray[np.int32], NDArray[np.uint16], NDArray[np.uint32], NDArray[np.uint32]]:
-    """Return some lists' origins, strides and codes of fronts and backs.
-
-    ``faces`` are fronts and backs in steps, (n, 2), and ``counts`` the lists' lengths.
-    """
-    origins, strides = np.zeros(len(counts), np.int32), np.zeros(len(counts), np.uint16)
-    occupied = np.flatnonzero(counts)
-    lengths = counts[occupied]
-    first = np.cumsum(lengths) - lengths
-    origin = np.rint(faces[first, 0])
-    span = np.rint(faces[first + lengths - 1, 1]) - origin
-    stride = np.maximum(1, np.ceil(span / DEPTH_CODES))
-    origins[occupied], strides[occupied] = origin, stride
-    own = np.repeat(np.arange(len(occupied)), lengths)
-    codes = np.rint((faces - origin[own, np.newaxis]) / stride[own, np.newaxis]).astype(np.int64)
-    # Keep every back at least 1 behind its front. Rounding keeps faces in order; what it made equal
-    # is moved behind, and where no codes are left behind, before. Less the thicknesses that must
-    # lie before it, a face may equal the one before it
-    within = np.arange(len(codes)) - first[own]
-    needed = np.stack([within, within + 1], axis=1)
-    slack = np.maximum(codes, 0) - needed
-    apart = own[:, np.newaxis] << 20  # no list's maximum reaches the next list
-    running = np.maximum.accumulate((slack + apart).reshape(-1)).reshape(-1, 2) - apart
-    most = DEPTH_CODES - lengths[own]
-    codes = np.minimum(running, most[:, np.newaxis]) + needed
-    front, back = codes.astype(np.uint32).T
-    return origins, strides, front, back

@@ -234,10 +234,7 @@ def packed(forms: Sequence[Floats], double_float: int = 0) -> NDArray[np.float32
 
 
 def largest_value(
-    camera: Camera,
-    window_size: Sequence[int],
-    bounds: Sequence[float],
-    forms: Sequence[Floats],
+    camera: Camera, window_size: Sequence[int], bounds: Sequence[float], forms: Sequence[Floats]
 ) -> float:
     """Return the largest magnitude of :func:`pixel_rays`' forms on rays that meet the bounds.
 
