@@ -103,13 +103,13 @@ class OcclusionGrid:
     one or two voxels; then no more.
     """
 
-    cell: tuple[int, int, int]
-    nodes: tuple[int, int, int]
+    cell: tuple[int, ...]
+    nodes: tuple[int, ...]
     step: float
     offsets: NDArray[np.float64]
-    margin: tuple[int, int, int]
-    padded: tuple[int, int, int]
-    samples: tuple[int, int, int]
+    margin: tuple[int, ...]
+    padded: tuple[int, ...]
+    samples: tuple[int, ...]
 
     @classmethod
     def of(cls, volume: Grid, occlusion: AmbientOcclusion) -> OcclusionGrid:
@@ -126,8 +126,9 @@ class OcclusionGrid:
         nodes = -(-(points - 1) // cell) + 1
         offsets = directions[:, None, :] * along[None, :, None]
         margin = np.floor(np.abs(offsets).max(axis=(0, 1))).astype(int) + 1
-        sizes = (margin, nodes + 2 * margin, np.minimum(2 * cell, 4))
-        return cls(_triple(cell), _triple(nodes), radius / steps, offsets, *map(_triple, sizes))
+        sizes = (cell, nodes, margin, nodes + 2 * margin, np.minimum(2 * cell, 4))
+        cells, total, *others = (tuple(each.tolist()) for each in sizes)
+        return cls(cells, total, radius / steps, offsets, *others)
 
     @property
     def nbytes(self) -> int:
@@ -145,8 +146,3 @@ def spread_directions(n: int) -> NDArray[np.float64]:
     angle = i * math.pi * (3 - math.sqrt(5))
     radius = np.sqrt(1 - z**2)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
-
-
-def _triple(values: NDArray[Any]) -> tuple[int, int, int]:
-    x, y, z = (int(v) for v in values)
-    return x, y, z

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,9 +59,6 @@ class Cropping:
     regions: int = PRESETS["subvolume"]
     normals: tuple[tuple[float, float, float], ...] = _AXES
 
-    #: Every region.
-    ALL: ClassVar[int] = 2**27 - 1
-
     def __post_init__(self) -> None:
         planes, normals = as_floats(self.planes), as_floats(self.normals)
         if planes.shape != (6,) or np.isnan(planes).any():
@@ -72,9 +69,9 @@ class Cropping:
             )
         regions: Any = self.regions
         flags = as_whole(PRESETS.get(regions, regions) if isinstance(regions, str) else regions)
-        if not 0 <= flags <= Cropping.ALL:
+        if not 0 <= flags < 2**27:
             raise InvalidArgumentError(
-                f"the regions of cropping are 27 flags, 0 to {Cropping.ALL:#x}, or one of "
+                f"the regions of cropping are 27 flags, 0 to {2**27 - 1:#x}, or one of "
                 f"{', '.join(map(repr, PRESETS))}; got {self.regions!r}"
             )
         if normals.shape != (3, 3) or not np.isfinite(normals).all() or not np.linalg.det(normals):

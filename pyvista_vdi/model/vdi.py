@@ -325,25 +325,17 @@ class DeferredVDI(Lists):
             raise InvalidVDIError(
                 f"value_range must be two finite numbers, low < high; got {ends!r}"
             )
+        #: What is stored beside :attr:`lists`, in values that JSON can hold.
+        self.about: dict[str, Any] = {"version": 1, "value_range": [low, high]}
         for name in ("unit_distance", "sample_distance"):
-            length = as_number(about.get(name))
+            length = self.about[name] = as_number(about.get(name))
             if not 0 < length < np.inf:
                 raise InvalidVDIError(f"{name} must be a length above 0; got {about.get(name)!r}")
             setattr(self, name, length)
+        self.about["importance"] = None  # older files say what counted most when lists were cut
         for name in ("camera", "window_size", "bounds", "depth_origin", "metadata"):
             setattr(self, name, getattr(lists, name))
         self.lists = lists
-
-    @property
-    def about(self) -> dict[str, Any]:
-        """What is stored beside :attr:`lists`, in values that JSON can hold."""
-        return {
-            "version": 1,
-            "value_range": list(self.value_range),
-            "unit_distance": self.unit_distance,
-            "sample_distance": self.sample_distance,
-            "importance": None,  # older files say which values counted most when lists were cut
-        }
 
     @cached_property
     def mean(self) -> NDArray[np.float32]:
