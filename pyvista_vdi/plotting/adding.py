@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle
-from typing import Any, ClassVar, NamedTuple, get_type_hints
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyvista as pv
@@ -31,10 +31,8 @@ from pyvista_vdi.model.options import (
     Deferral,
     DrawingOptions,
     GenerationOptions,
-    Option,
     Options,
     QualityTarget,
-    declared,
     option,
     record,
 )
@@ -135,19 +133,6 @@ class Addition:
     deferral: Deferral
     drawing: DrawingOptions
 
-    #: The options of all of them.
-    declared: ClassVar[Mapping[str, Option]]
-
-    @classmethod
-    def checked(cls, **given: Any) -> Addition:
-        """Return what was asked for by names of options."""
-        return cls(
-            *(
-                each.checked(**{n: given[n] for n in each.declared if n in given})
-                for each in _RECORDS
-            )
-        )
-
     def __post_init__(self) -> None:
         if self.target:
             refuse_settings(self.target, self.options)
@@ -171,10 +156,6 @@ class Addition:
             raise UnsupportedError(
                 "draw='volume' draws the volume, and this is a VDI without one: leave draw out"
             )
-
-
-_RECORDS: list[Any] = [each for each in get_type_hints(Addition).values() if isinstance(each, type)]
-Addition.declared = {n: told for n, told in declared(*_RECORDS).items() if n != "lights"}
 
 
 class _Shown(NamedTuple):
