@@ -495,9 +495,9 @@ class Driver:
             request = source.made_of
             if request is None or request.content != planned.content:
                 request = wanted
-            if planned.in_bricks:  # for pictures of that size
-                request = source.MakeRequest(frame.view)
             assert request is not None
+            if planned.in_bricks and request.screen != frame.view:  # for pictures of that size
+                request = source.MakeRequest(frame.view)
             self._volume = VolumePicture(request, in_bricks=planned.in_bricks)
         return self._volume
 
