@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -12,6 +11,7 @@ from inspect import Parameter
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
+from pyvista_vdi.model.checks import suggestion
 from pyvista_vdi.model.options import (
     RECORDS,
     Deferral,
@@ -35,9 +35,7 @@ def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) ->
         if name in known:
             continue
         elsewhere = (each.elsewhere for each in RECORDS if name in vars(each)["declared"])
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
-        hint = next(filter(None, elsewhere), hint)
+        hint = next(filter(None, elsewhere), suggestion(name, known))
         if "settings" in known and name in options and options[name].setting:
             hint = f"pass it by settings=pyvista_vdi.Settings({name}=...)"
         raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")

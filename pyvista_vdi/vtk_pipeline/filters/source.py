@@ -16,6 +16,7 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     Cancelled,
     InvalidArgumentError,
+    InvalidArgumentTypeError,
     InvalidVDIError,
     InvalidVolumeError,
 )
@@ -87,6 +88,14 @@ class Request(GenerationRequest):
         return replace(self, camera=camera, window_size=window_size, metadata=metadata)
 
 
+def _checked_options(options: GenerationOptions) -> GenerationOptions:
+    if not isinstance(options, GenerationOptions):
+        raise InvalidArgumentTypeError(
+            f"options must be GenerationOptions; got {options!r}: of one alone there is a Set"
+        )
+    return options
+
+
 class VDISource(SceneAlgorithm, Input):
     """Generate a VDI from the volume at its input.
 
@@ -137,6 +146,7 @@ class VDISource(SceneAlgorithm, Input):
         "options",
         "how the VDI is made, all of it at once; lights are set by ``SetLights``",
         GenerationOptions(),
+        _checked_options,
     )
     SetDial, GetDial = accessors(
         "target",
