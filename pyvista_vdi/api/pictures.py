@@ -63,6 +63,8 @@ def render(
         A :class:`VDISet` shows what was made nearest to the view, by itself blended with what is
         about as near.
         Several are merged by depth along each ray; their order does not matter, to the last bit.
+        ``clipping_planes`` cut all of them, or each its own in a list of such arrays, ``None`` for
+        none; ``cropping`` is then a list with an entry for each, ``opacity_multiplier`` may be.
         A :class:`DeferredVDI`, or a set of such, takes the words of
         :meth:`DeferredVDI.classified` (``cmap``, ``opacity``, ``clim`` ...) as well; of several,
         those that keep values take them.
@@ -74,17 +76,6 @@ def render(
     opaque_depth : array_like of float32, shape (H, W), optional
         Depth at which each ray ends: distance from the eye along the view direction, world
         units, top row first; infinity where nothing is opaque.
-    clipping_planes : array_like of float, shape (k, 6), or list of these, optional
-        Origin and normal of each plane, world coordinates; the side that the normal points to
-        is kept. They cut all of several VDIs; a list of such arrays cuts each by its own.
-    cropping : Cropping or vtkVolumeMapper or sequence of six numbers or pair, or list, optional
-        Which of 27 regions of the data's own coordinates are drawn, as in ``vtkVolumeMapper``: a
-        :class:`Cropping`, a mapper's, the six planes of a box, or a pair of these and regions
-        (flags, or ``"fence"``, ``"cross"`` ...). For several VDIs a list with one for each.
-    opacity_multiplier : float or list of float, default: 1.0
-        Factor of the extinction, 0 or above: 2 is twice as dense. For what is not opaque it is
-        the same as dividing the opacity unit distance by it. For several VDIs one for all, or a
-        list with one for each.
     model_transforms : sequence of array_like of float, shape (4, 4), optional
         Where the model frame of each of several VDIs is; the camera's model transform for all by
         default.

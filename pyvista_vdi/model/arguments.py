@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import field, make_dataclass, replace
+from dataclasses import field, make_dataclass
 from functools import wraps
 from inspect import Parameter
 from typing import Any
@@ -97,13 +97,11 @@ def takes(
     all of them. Its signature then has the options instead, by keyword, or where ``order`` has
     their names as positional arguments of that order; and its docstring an entry for each that it
     does not describe itself. ``aliases`` are other names that are taken as well. ``returns``: what
-    the function returns, by the values of an option; ``kinds``: types of options that are others
+    the function returns, by the values of an option; ``kinds``: types of arguments that are others
     than declared; ``without``: options that are not taken. What is seldom turned is taken as
     ``settings``.
     """
     options = {n: told for n, told in declared(*records.values()).items() if n not in without}
-    for name, kind in (kinds or {}).items():
-        options[name] = replace(options[name], kind=kind)
     if hidden := sorted([name for name, told in options.items() if told.setting]):
         options = {name: told for name, told in options.items() if not told.setting}
         what = f"options that are seldom turned; here {', '.join(hidden)}"
@@ -119,7 +117,8 @@ def takes(
         for name in dict.fromkeys([*listed, *options]):
             told = options[name]
             kind = Parameter.POSITIONAL_OR_KEYWORD if name in listed else Parameter.KEYWORD_ONLY
-            made.append(Parameter(name, kind, default=told.default, annotation=told.kind))
+            of = (kinds or {}).get(name, told.kind)
+            made.append(Parameter(name, kind, default=told.default, annotation=of))
         signature = own.replace(parameters=[*made, *by_name])
         named = signature.parameters
         open_ended = bool(by_name) and by_name[-1].kind is Parameter.VAR_KEYWORD

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import (
@@ -355,11 +355,12 @@ class VDISource(SceneAlgorithm, Input):
         self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
     ) -> None:
         """Take a renderer's view, unless nothing can be drawn from it; this raises why not."""
+        given, view = self.GetCamera(), None
         if not self.has_view:
-            self.MakeRequest(self.view_for(camera, size, model_transform))
-        given = self.GetCamera()
-        if given is None:
-            self.take_camera(camera, model_transform)
+            view = self.view_for(camera, size, model_transform)
+            self.MakeRequest(view)
+        if given is None and view is not None:
+            self.take_camera(view.camera)
         elif self.of_scene and self._frame_camera is None and self.made_of is None:
             # One that was given with the volume
             self.SetCamera(given.replace(model_transform=model_transform))
@@ -377,7 +378,7 @@ class VDISource(SceneAlgorithm, Input):
             given = given.replace(model_transform=model_transform)
         return View(given, self.GetWindowSize() or size)
 
-    def take_camera(self, camera: Any, model_transform: NDArray[np.float64]) -> None:
+    def take_camera(self, camera: Any, model_transform: ArrayLike | None = None) -> None:
         """Set a renderer's view as that of the next VDI."""
         self.SetCamera(camera, model_transform)
         self._frame_camera = self.GetCamera()
