@@ -83,6 +83,12 @@ def one_of(value: Any, name: str, names: Sequence[str], none: bool = False) -> A
     raise error(f"{name} must be {known}; got {value!r}{hint}")
 
 
+def suggestion(name: str, known: Sequence[str], cutoff: float = 0.6) -> str:
+    """Return the known name that an unknown one is near to, as a question, or all there are."""
+    near = difflib.get_close_matches(name, known, n=1, cutoff=cutoff)
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
+
+
 def check_callback(function: Any) -> None:
     """Raise InvalidArgumentTypeError if ``progress`` is neither a function nor ``None``."""
     if function is not None and not callable(function):

@@ -45,7 +45,7 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
         kept = _kept.get(id(volume))
         if kept is not None and kept[0] == made_of:
             return kept[1]
-        made: Volume = registry.method("Volume.from_vtk")(volume, scalars, preference)
+        made = Volume.from_vtk(volume, scalars, preference)
         forget = functools.partial(_kept.pop, id(volume), None)
         _kept[id(volume)] = made_of, made, weakref.ref(volume, lambda _: forget())
         return made

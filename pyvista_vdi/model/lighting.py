@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -145,7 +145,7 @@ class Lights:
         Whether a side that faces away from a light is lit as if it faced it (VTK's default).
     """
 
-    lights: tuple[Light, ...] = field(default_factory=lambda: (Light(),))
+    lights: tuple[Light, ...] = (Light(),)
     two_sided: bool = True
 
     @classmethod

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVolumeError
 from pyvista_vdi.model.checks import as_floats, as_vector
 from pyvista_vdi.model.chunked import ChunkedArray, held, library_of
@@ -161,6 +162,35 @@ class Volume(Grid):
                 f"spacing must be positive along each axis; got {self.spacing}: "
                 "flip the array (or the direction matrix) instead of a negative spacing"
             )
+
+    @staticmethod
+    def from_vtk(image: Any, scalars: str | None = None, preference: str = "point") -> Volume:
+        """Make a volume of a VTK image, to be drawn again and again.
+
+        Parameters
+        ----------
+        image : vtkImageData or pyvista.ImageData
+            Its origin, spacing, direction matrix and ghost arrays are honoured.
+        scalars : str, optional
+            Name of the array; the active scalars by default, else the only array there is.
+        preference : {"point", "cell"}
+            Which array, where points and cells both have one of that name.
+
+        Returns
+        -------
+        Volume
+            It shares memory with the point array where that is contiguous and of a type that
+            kernels read; cell data become point data.
+
+        Raises
+        ------
+        InvalidVolumeError
+            If there are no such scalars, or not a grid of at least 2 x 2 x 2 points.
+        UnsupportedError
+            If it is another kind of grid, or the scalars have several components.
+        """
+        from_vtk = registry.method("Volume.from_vtk")
+        return from_vtk(image, scalars, preference)  # type: ignore[no-any-return]
 
     def in_view(self, *cameras: Any, window_size: Sequence[int]) -> Volume:
         """Return what of several levels these views require: of one, itself."""
