@@ -97,11 +97,8 @@ def check_callback(function: Any) -> None:
 
 def as_range(values: Any) -> tuple[float, float]:
     """Return two numbers as floats, NaN where they are no numbers or not two."""
-    try:
-        low, high = values
-    except (TypeError, ValueError):
-        return math.nan, math.nan
-    return as_float(low), as_float(high)
+    ends = as_floats(values)
+    return tuple(ends.tolist()) if ends.shape == (2,) else (math.nan, math.nan)
 
 
 def as_floats(values: Any) -> NDArray[np.float64]:

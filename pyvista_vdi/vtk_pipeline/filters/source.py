@@ -32,7 +32,7 @@ from pyvista_vdi.model.options import (
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import LightsLike
-from pyvista_vdi.model.vdi import VDI, DeferredVDI, screen_metadata
+from pyvista_vdi.model.vdi import LENS, VDI, DeferredVDI
 from pyvista_vdi.model.view import bounds_corners, covering_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.targets import generate_to_target, warn_missed
@@ -84,7 +84,8 @@ class Request(GenerationRequest):
         """Return the same from another V_O; the VDI's metadata say the screen's where that is."""
         metadata = {name: entry for name, entry in self.metadata.items() if name != "screen"}
         if (camera, window_size) != (self.screen.camera, self.screen.size):
-            metadata["screen"] = screen_metadata(self.screen.camera, self.screen.size)
+            seen = self.screen.camera.to_dict()
+            metadata["screen"] = {"window_size": [*self.screen.size]} | {n: seen[n] for n in LENS}
         return replace(self, camera=camera, window_size=window_size, metadata=metadata)
 
 
