@@ -30,13 +30,12 @@ from pyvista_vdi.model.options import (
 def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) -> None:
     """Raise TypeError for the first argument whose name is not known, and say what is meant."""
     known = [name for name in known if name not in ("self", "look")]
-    options = declared(*RECORDS)
     for name in given:
         if name in known:
             continue
         elsewhere = (each.elsewhere for each in RECORDS if name in vars(each)["declared"])
         hint = next(filter(None, elsewhere), suggestion(name, known))
-        if "settings" in known and name in options and options[name].setting:
+        if "settings" in known and name in Settings.declared:
             hint = f"pass it by settings=pyvista_vdi.Settings({name}=...)"
         raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")
 
@@ -135,7 +134,7 @@ def takes(
             except TypeError as error:
                 raise TypeError(f"{called_by}() {error}") from None
             given |= zip(named, args, strict=False)
-            taken = {name: given.pop(name) for name in [*given] if name in options}
+            taken = {name: given.pop(name) for name in options.keys() & given.keys()}
             made = records_of(taken, called_by, *records.values(), without=without)
             return function(**given, **dict(zip(records, made, strict=True)))
 
@@ -167,10 +166,12 @@ def records_of(
     does; ``defaults`` are others than declared. ``others`` are the function's other arguments,
     which the error may suggest.
     """
-    options = declared(*records)
-    turned = sorted([n for n, told in options.items() if told.setting and n not in without])
-    names = [name for name, told in options.items() if not told.setting]
-    refuse_unknown(given, function, (*names, *["settings"] * bool(turned), *(others or ())))
+    taken = [told for told in declared(*records).values() if told.name not in without]
+    names = [told.name for told in taken if not told.setting]
+    turned = sorted([told.name for told in taken if told.setting])
+    names += ["settings"] * bool(turned)
+    if not given.keys() <= {*names}:
+        refuse_unknown(given, function, (*names, *(others or ())))
     settings = given.get("settings")
     if not isinstance(settings, Settings | None):
         raise InvalidArgumentTypeError(f"settings must be a pyvista_vdi.Settings; got {settings!r}")
