@@ -1,12 +1,10 @@
 """Records of a slice's rays: marched and merged, fitted to the budget, and packed."""
 
-from collections.abc import Mapping
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime
 from pyvista_vdi.device.constants import GROUP, RUN_WORDS, block_items
@@ -17,7 +15,7 @@ from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.ray_forms import Rectangle, check_list_space
 from pyvista_vdi.volume.bricks import StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.rays import GridRays, RayLaunch, Variant
+from pyvista_vdi.volume.rays import GridRays, RayLaunch
 
 
 class Records(AbstractContextManager["Records"]):
@@ -26,9 +24,9 @@ class Records(AbstractContextManager["Records"]):
     ``rays`` are marched through the ``window``, all or part of V_O's window of ``size``, which
     ``slices`` cut. On the device are their ``forms``, their ``runs`` and merge ``errors``, the
     merge error that each accepts (``thresholds``: ``finest`` until its record has been full), and
-    how many runs it has (``counts``). ``view`` has the numbers of a slice's rays
-    (``RaysOfView``), ``recording`` those of the records, which are shortened to what is kept
-    between chunks of a march.
+    how many runs it has (``counts``). ``march`` has the rays in float64, ``view`` the numbers of a
+    slice's rays (``RaysOfView``), ``recording`` those of the records, which are shortened to what
+    is kept between chunks of a march.
     """
 
     def __init__(
@@ -44,8 +42,7 @@ class Records(AbstractContextManager["Records"]):
         check_list_space(camera, rays.grid.bounds)
         self.runtime, self.rays, self.size, self.slices = runtime, rays, size, slices
         self.window = window or Rectangle(0, size[0], 0, size[1])
-        march = rays.forms(camera, size)
-        self.planes, self.double_float = march.planes, march.double_float
+        self.march = march = rays.forms(camera, size)
         self.depth_origin = march.rays.reference_depth
         self.finest = np.float32(options.finest_error)
         voxel = min(rays.grid.spacing)
@@ -109,7 +106,7 @@ class Records(AbstractContextManager["Records"]):
         rows = Rectangle(x0, x1, y0 + part.first_row, y0 + part.first_row + part.rows)
         self.items = block_items(x1 - x0, part.rows)
         self.lists = part.rows * (x1 - x0)
-        self.view = self.rays.view(self.size, self.planes, rows)
+        self.view = self.rays.view(self.size, self.march.planes, rows)
         self.runtime.fill(self.counts, np.uint32(0))
         self.runtime.fill(self.thresholds, self.finest)
 
@@ -149,7 +146,7 @@ class Chunk(NamedTuple):
 
 
 class March(AbstractContextManager["March"]):
-    """Marches the rays of slices, a chunk of steps at a time.
+    """Marches the rays of slices, one of the ``chunks`` of steps at a time.
 
     ``entering``: the light that enters part of a grid along each ray of the window, 0 to 1.
     """
@@ -161,15 +158,14 @@ class March(AbstractContextManager["March"]):
         camera: Camera,
         entering: DeviceBuffer | None = None,
     ) -> None:
-        self._records, self._most_steps = records, medium.most_steps
+        self._records = records
+        self.chunks = self._chunks(medium)
         runtime, arguments = records.runtime, medium.medium_arguments(camera)
         # Opacity is summed up from 0 in every run
         compensated = 2 if medium.variant.compensated > 1 else 0
         variant = replace(
-            medium.variant, double_float=records.double_float, compensated=compensated
+            medium.variant, double_float=records.march.double_float, compensated=compensated
         )
-        bricks = medium.bricks is not None
-        self._longest = self._longest_rays(arguments, variant, variant.one_by_one or bricks)
         with ExitStack() as stack:
             self._sampler = None
             if medium.bricks is not None:
@@ -183,7 +179,7 @@ class March(AbstractContextManager["March"]):
                 "generation/march_lists.cl",
                 "march_lists",
                 variant.defines,
-                one_by_one=variant.one_by_one or bricks,
+                one_by_one=variant.one_by_one or medium.bricks is not None,
                 **arguments,
                 forms=records.forms,
                 samples=self._sampler and self._sampler.samples,
@@ -198,11 +194,22 @@ class March(AbstractContextManager["March"]):
     def __exit__(self, *_: object) -> None:
         self._buffers.close()
 
-    def chunks(self, part: Slice) -> list[Chunk]:
-        """Return the chunks that reach the end of a slice's longest ray."""
+    def _chunks(self, medium: DeviceVolume) -> list[Chunk]:
+        """Return the chunks that reach the end of any ray."""
+        (x0, x1, y0, y1), (width, height) = self._records.window, self._records.size
+        corners = [(1, x - width / 2, y - height / 2) for x in (x0, x1) for y in (y0, y1)]
+        forms = np.reshape(self._records.march.forms[:6], (2, 3, 2, 3))
+        slopes, directions = forms[:, :, 1] @ np.transpose(corners)
+        # Rays through an axis' first and last points are the longer the more they lean: most at a
+        # corner, unless some of them do not move along it. A voxel, a hundredth and two steps more
+        # are for what float32 rounds
+        with np.errstate(divide="ignore"):
+            lean = (np.linalg.norm(directions, axis=0) / np.abs(slopes)).max(axis=1)
+        lean[np.abs(np.sign(slopes).sum(axis=1)) < len(corners)] = np.inf
+        longest = 1.01 * (lean * medium.volume.dimensions).min() / medium.sample_distance + 2
         found: list[Chunk] = []
-        first, steps, most = 0, _FIRST_CHUNK_STEPS, self._most_steps
-        while first < min(most, self._longest[part.number]):
+        first, steps, most = 0, _FIRST_CHUNK_STEPS, medium.most_steps
+        while first < min(most, longest):
             found.append(Chunk(first, steps, first + steps >= most))
             first, steps = first + steps, CHUNK_STEPS
         return found
@@ -214,26 +221,3 @@ class March(AbstractContextManager["March"]):
         if self._sampler is not None:
             self._sampler.sample(records.view)
         self._launch(records.items, view=records.view)
-
-    def _longest_rays(
-        self, medium: Mapping[str, Any], variant: Variant, one_by_one: bool
-    ) -> NDArray[np.int32]:
-        """Return the steps of the longest ray of each slice: chunks behind them have nothing."""
-        records = self._records
-        runtime, window = records.runtime, records.window
-        with runtime.buffer((len(records.slices),), np.int32, "longest rays") as longest:
-            runtime.fill(longest, np.int32(0))
-            launch = RayLaunch(
-                runtime,
-                "generation/march_lists.cl",
-                "longest_marches",
-                variant.defines,
-                one_by_one=one_by_one,
-                classified=medium["classified"],
-                view=records.rays.view(records.size, records.planes, window),
-                forms=records.forms,
-                slice_rows=records.slices.rows,
-                longest=longest,
-            )
-            launch(block_items(window.x1 - window.x0, window.y1 - window.y0))
-            return runtime.download(longest)

@@ -47,8 +47,8 @@ from pyvista_vdi.model.packing import (
     PRECISIONS,
     TAU_CODES,
     Arrays,
-    Codes,
     Packed8,
+    words_of,
 )
 from pyvista_vdi.model.vdi import VDI, DeferredVDI, made_vdi
 
@@ -292,14 +292,8 @@ class _OpenFile:
             self._refuse("it does not describe its arrays")
         if counts.str not in ("|u1", "<u2", "<u4", "<u8"):
             self._refuse(f"counts of type {counts} are unknown")
-        wanted = layouts(
-            info.window_size,
-            info.n_supersegments,
-            counts,
-            filtered=info.codec != "none",
-            version=info.format_version,
-            precision=info.precision,
-        )
+        filtered, version = info.codec != "none", info.format_version
+        wanted = layouts(info, counts, filtered=filtered, version=version)
         for name, layout in wanted.items():
             if arrays.get(name) != layout.to_dict():
                 self._refuse(
@@ -451,5 +445,5 @@ def packed_of_stored(
         offsets,
         origins.astype(np.int32),
         strides.astype(np.uint16),
-        Codes(*(code.astype(np.uint32, copy=False) for code in codes)).words(),
+        words_of(*(code.astype(np.uint32, copy=False) for code in codes)),
     )
