@@ -146,7 +146,7 @@ class Chunk(NamedTuple):
 
 
 class March(AbstractContextManager["March"]):
-    """Marches the rays of slices, a chunk of steps at a time.
+    """Marches the rays of slices, one of the ``chunks`` of steps at a time.
 
     ``entering``: the light that enters part of a grid along each ray of the window, 0 to 1.
     """
@@ -158,7 +158,8 @@ class March(AbstractContextManager["March"]):
         camera: Camera,
         entering: DeviceBuffer | None = None,
     ) -> None:
-        self._records, self._medium = records, medium
+        self._records = records
+        self.chunks = self._chunks(medium)
         runtime, arguments = records.runtime, medium.medium_arguments(camera)
         # Opacity is summed up from 0 in every run
         compensated = 2 if medium.variant.compensated > 1 else 0
@@ -193,25 +194,23 @@ class March(AbstractContextManager["March"]):
     def __exit__(self, *_: object) -> None:
         self._buffers.close()
 
-    def chunks(self, part: Slice) -> list[Chunk]:
-        """Return the chunks that reach the end of any ray of a slice."""
-        records, medium = self._records, self._medium
-        (x0, x1, y0, _), (width, height) = records.window, records.size
-        rows = y0 + part.first_row, y0 + part.first_row + part.rows
-        corners = [(1, x - width / 2, y - height / 2) for x in (x0, x1) for y in rows]
-        # Between an axis' first and last points a ray is as long as they are far from each other,
-        # over its slope, which is affine in the pixel. A voxel, a hundredth and two steps more are
-        # for what float32 rounds
-        per_t = np.reshape(records.march.forms[:6], (2, 3, 2, 3))[:, :, 1] @ np.transpose(corners)
-        slopes, speed = np.abs(per_t[0]).min(axis=1), np.linalg.norm(per_t[1], axis=0).max()
-        slopes[per_t[0].min(axis=1) * per_t[0].max(axis=1) <= 0] = 0
+    def _chunks(self, medium: DeviceVolume) -> list[Chunk]:
+        """Return the chunks that reach the end of any ray."""
+        (x0, x1, y0, y1), (width, height) = self._records.window, self._records.size
+        corners = [(1, x - width / 2, y - height / 2) for x in (x0, x1) for y in (y0, y1)]
+        forms = np.reshape(self._records.march.forms[:6], (2, 3, 2, 3))
+        slopes, directions = forms[:, :, 1] @ np.transpose(corners)
+        # Rays through an axis' first and last points are the longer the more they lean: most at a
+        # corner, unless some of them do not move along it. A voxel, a hundredth and two steps more
+        # are for what float32 rounds
         with np.errstate(divide="ignore"):
-            length = speed * (medium.volume.dimensions / slopes).min()
-        longest = min(medium.most_steps, 1.01 * length / medium.sample_distance + 2)
+            lean = (np.linalg.norm(directions, axis=0) / np.abs(slopes)).max(axis=1)
+        lean[np.abs(np.sign(slopes).sum(axis=1)) < len(corners)] = np.inf
+        longest = 1.01 * (lean * medium.volume.dimensions).min() / medium.sample_distance + 2
         found: list[Chunk] = []
-        first, steps = 0, _FIRST_CHUNK_STEPS
-        while first < longest:
-            found.append(Chunk(first, steps, first + steps >= medium.most_steps))
+        first, steps, most = 0, _FIRST_CHUNK_STEPS, medium.most_steps
+        while first < min(most, longest):
+            found.append(Chunk(first, steps, first + steps >= most))
             first, steps = first + steps, CHUNK_STEPS
         return found
 

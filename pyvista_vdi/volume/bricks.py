@@ -64,10 +64,6 @@ class Room:
             return self.limit
         return int(_SHARE_OF_FREE * (runtime.info.global_memory - runtime.allocated))
 
-    def for_bricks(self, runtime: Runtime, others: int) -> int:
-        """Return the bytes left for bricks beside ``others``, and what holds their samples."""
-        return self.in_all(runtime) - self.working - self.sample_bytes - others
-
     @property
     def sample_bytes(self) -> int:
         """Bytes of the samples that bricks need beside them."""

@@ -378,7 +378,7 @@ def _bricks_within(
     dtype = volume.array.dtype if scale is None else np.dtype(np.float32)
     point_bytes = dtype.itemsize * math.prod(volume.array.shape[3:])
     others = other_bytes(volume)
-    left = room.for_bricks(runtime, others)
+    left = room.in_all(runtime) - room.working - room.sample_bytes - others
     largest = runtime.info.max_allocation
     found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
     if found is None:
