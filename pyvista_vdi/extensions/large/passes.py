@@ -204,7 +204,7 @@ class Task:
             ):
                 for part in slices:
                     records.begin(part)
-                    for chunk in march.chunks:
+                    for chunk in march.chunks(part):
                         march.advance(chunk)
                         records.make_room(last=chunk.last)
                     if options.criterion == "least-error":
