@@ -66,7 +66,7 @@ def test_reading_gives_back_every_bit(precision, tmp_path):
 @pytest.mark.parametrize(
     ("change", "why"),
     [
-        (lambda text: text.replace(b"UEsDB", b"UEs*B", 1), "is no base64"),
+        (lambda text: text.replace(b"UEsDB", b"UEs*DB", 1), "is no base64"),
         (lambda text: text[: len(text) - 400], "is truncated"),
         (lambda text: text.replace(b"UEsDB", b"AEsDB", 1), "is not a VDI file"),
         (lambda _: b"<!doctype html><p>hello", "is not a page with a VDI: it has no"),
