@@ -134,21 +134,3 @@ KERNEL_OF_LANES void march_lists(
         store_run(records, SELECT((Int)(-1), starts + count - 1, count > 0), growing.run);
     store_counts(counts, lists, rays.present, count);
 }
-
-// Find the steps of the longest ray of each slice of rows.
-KERNEL_OF_LANES void longest_marches(const Classified classified, const RaysOfView view,
-                                     __global const float *forms,
-                                     int slice_rows,        // a multiple of a block's
-                                     __global int *longest) // of each slice; 0 at first
-{
-    const uint first = (uint)get_global_id(0) * LANES;
-    const Rays rays = rays_of_view(&view, first);
-    March march;
-    if (!ANY(rays.present) ||
-        !ANY(begin_march(&march, &view, &classified, forms, rays.a, rays.b, INFINITY)))
-        return;
-    __global int *of_slice = longest + block_pixel(first, view.columns).y / slice_rows;
-    const int steps = largest_lane(SELECT((Int)(0), march.steps - march.begin, rays.present));
-    if (steps > *of_slice) // an old value is only lower, and does no harm
-        atomic_max(of_slice, steps);
-}

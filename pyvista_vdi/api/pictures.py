@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.arguments import Raw, refuse_unknown, takes
+from pyvista_vdi.model.arguments import refuse_unknown, takes
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_flag
 from pyvista_vdi.model.classification import IN_PLACE, Classification
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.inputs import as_vdi, as_volume
-from pyvista_vdi.model.options import FrameRequest, MediumOptions, RenderOptions, SceneOptions
+from pyvista_vdi.model.options import FrameRequest, MediumOptions, RenderOptions
 from pyvista_vdi.model.types import CameraLike, DeviceLike, ShownLike, VolumeLike, WindowSize
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
@@ -25,8 +25,19 @@ if TYPE_CHECKING:
     from pyvista_vdi.raycasting.picking import Pick
 
 
+#: Options of pictures of one VDI.
+_OF_ONE = ("preview_samples", "transmittance_cutoff")
+
+
+class _OfSeveral(RenderOptions):
+    """Options of one VDI or, some of them, lists for several: what takes them checks them."""
+
+    def __post_init__(self) -> None:
+        """Keep them as they are given."""
+
+
 @takes(
-    options=Raw(RenderOptions),
+    options=_OfSeveral,
     kinds={
         "clipping_planes": "ArrayLike | Sequence[ArrayLike | None] | None",
         "opacity_multiplier": "float | Sequence[float]",
@@ -35,7 +46,7 @@ if TYPE_CHECKING:
 def render(
     vdi: ShownLike | Sequence[ShownLike],
     camera: CameraLike,
-    options: dict[str, Any],
+    options: _OfSeveral,
     window_size: WindowSize | None = None,
     *,
     opaque_depth: ArrayLike | None = None,
@@ -52,6 +63,8 @@ def render(
         A :class:`VDISet` shows what was made nearest to the view, by itself blended with what is
         about as near.
         Several are merged by depth along each ray; their order does not matter, to the last bit.
+        ``clipping_planes`` cut all of them, or each its own in a list of such arrays, ``None`` for
+        none; ``cropping`` is then a list with an entry for each, ``opacity_multiplier`` may be.
         A :class:`DeferredVDI`, or a set of such, takes the words of
         :meth:`DeferredVDI.classified` (``cmap``, ``opacity``, ``clim`` ...) as well; of several,
         those that keep values take them.
@@ -63,17 +76,6 @@ def render(
     opaque_depth : array_like of float32, shape (H, W), optional
         Depth at which each ray ends: distance from the eye along the view direction, world
         units, top row first; infinity where nothing is opaque.
-    clipping_planes : array_like of float, shape (k, 6), or list of these, optional
-        Origin and normal of each plane, world coordinates; the side that the normal points to
-        is kept. They cut all of several VDIs; a list of such arrays cuts each by its own.
-    cropping : Cropping or vtkVolumeMapper or sequence of six numbers or pair, or list, optional
-        Which of 27 regions of the data's own coordinates are drawn, as in ``vtkVolumeMapper``: a
-        :class:`Cropping`, a mapper's, the six planes of a box, or a pair of these and regions
-        (flags, or ``"fence"``, ``"cross"`` ...). For several VDIs a list with one for each.
-    opacity_multiplier : float or list of float, default: 1.0
-        Factor of the extinction, 0 or above: 2 is twice as dense. For what is not opaque it is
-        the same as dividing the opacity unit distance by it. For several VDIs one for all, or a
-        list with one for each.
     model_transforms : sequence of array_like of float, shape (4, 4), optional
         Where the model frame of each of several VDIs is; the camera's model transform for all by
         default.
@@ -104,8 +106,7 @@ def render(
         if getattr(each, "value_range", None):
             shown[number] = each.classified(**look, device=device)
     if several or model_transforms is not None:
-        alone = {name: options.pop(name) for name in ("preview_samples", "transmittance_cutoff")}
-        for name in RenderOptions(**alone).given:
+        for name in options.given.keys() & {*_OF_ONE}:
             raise InvalidArgumentError(f"{name} is for a single VDI: leave it out for several")
         from pyvista_vdi.raycasting.multi_vdi import common_window_size, placed_vdis, render_vdis
 
@@ -116,12 +117,13 @@ def render(
             if _is_of_views(shown[number]):
                 views[number] = view.replace(model_transform=matrix)
         seen = [_seen(each, place) for each, place in zip(shown, views, strict=True)]
-        placed = placed_vdis(seen, view, model_transforms, **options)
+        planes, factors = options.clipping_planes, options.opacity_multiplier
+        placed = placed_vdis(seen, view, model_transforms, planes, options.cropping, factors)
         size: Any = common_window_size(placed) if window_size is None else window_size
         return render_vdis(placed, FrameRequest(view, size, RenderOptions(), opaque_depth, device))
     one: Any = shown[0] if _is_of_views(shown[0]) else as_vdi(shown[0])
     size = one.picture_size if window_size is None else window_size
-    request = FrameRequest(view, size, RenderOptions(**options), opaque_depth, device)
+    request = FrameRequest(view, size, RenderOptions(**vars(options)), opaque_depth, device)
     if _is_of_views(one):
         from pyvista_vdi.raycasting.multi_vdi import blended
 
@@ -131,11 +133,11 @@ def render(
     return render_vdi(one, request)
 
 
-@takes(options=SceneOptions)
+@takes(options=RenderOptions, without=_OF_ONE)
 def render_depth(
     vdi: ShownLike,
     camera: CameraLike,
-    options: SceneOptions,
+    options: RenderOptions,
     window_size: WindowSize | None = None,
     *,
     opacity_threshold: float = DEFAULT_OPACITY,
@@ -175,18 +177,18 @@ def render_depth(
     seen = _seen(shown, view)
     usual = getattr(shown, "picture_size", seen.picture_size)
     size: Any = usual if window_size is None else window_size
-    request = FrameRequest(view, size, RenderOptions(**vars(options)), opaque_depth, device)
+    request = FrameRequest(view, size, options, opaque_depth, device)
     from pyvista_vdi.raycasting.raycast import render_first_hits
 
     return render_first_hits(seen, request, FirstHit.of(opacity_threshold, accumulated))
 
 
-@takes(options=SceneOptions)
+@takes(options=RenderOptions, without=_OF_ONE)
 def pick(
     vdi: ShownLike,
     camera: CameraLike,
     pixel: Sequence[float],
-    options: SceneOptions,
+    options: RenderOptions,
     window_size: WindowSize | None = None,
     *,
     opacity_threshold: float = DEFAULT_OPACITY,
@@ -246,18 +248,18 @@ def pick(
     size: Any = usual if window_size is None else window_size
     from pyvista_vdi.raycasting.picking import pick_vdi
 
-    request = FrameRequest(view, size, RenderOptions(**vars(options)), opaque_depth)
+    request = FrameRequest(view, size, options, opaque_depth)
     return pick_vdi(seen, request, pixel, FirstHit.of(opacity_threshold, accumulated), kept)
 
 
-@takes(look=Classification, medium=MediumOptions, options=SceneOptions)
+@takes(look=Classification, medium=MediumOptions, options=RenderOptions, without=_OF_ONE)
 def render_volume(
     volume: VolumeLike,
     camera: CameraLike,
     window_size: WindowSize,
     look: Classification,
     medium: MediumOptions,
-    options: SceneOptions,
+    options: RenderOptions,
     *,
     opaque_depth: ArrayLike | None = None,
     early_termination: bool = True,
@@ -299,17 +301,11 @@ def render_volume(
         If there is no device, or it fails.
     """
     view, read = Camera.from_any(camera), as_volume(volume, look.scalars, look.preference)
-    drawn = RenderOptions(**vars(options))
     if not as_flag(early_termination, "early_termination"):
-        drawn = drawn.replace(transmittance_cutoff=0.0)
+        options = options.replace(transmittance_cutoff=0.0)
     table = look.transfer_function_of(read)
-    request = FrameRequest(
-        view,
-        window_size,  # type: ignore[arg-type]  # which it checks
-        drawn,
-        opaque_depth,
-        device,
-    )
+    size: Any = window_size
+    request = FrameRequest(view, size, options, opaque_depth, device)
     from pyvista_vdi.volume.render import raycast_volume
 
     return raycast_volume(read, table, request, medium)

@@ -115,24 +115,16 @@ def generate(
         deferral.refuse_target(target)
     from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 
-    request = GenerationRequest(
-        volume=read,
-        transfer_function=(
-            unclassified(look.interpolation)
-            if deferral.deferred
-            else look.transfer_function_of(read)
-        ),
-        camera=camera,  # type: ignore[arg-type]  # which it checks
-        window_size=window_size,  # type: ignore[arg-type]  # likewise
-        options=options,
-        device=device,
-        progress=progress,
-        metadata={"classification": look.describe(), "scalars": read.name},
-    )
+    keeps = deferral.deferred
+    table = unclassified(look.interpolation) if keeps else look.transfer_function_of(read)
+    view: Any = camera
+    size: Any = window_size  # which the request checks, as the view
+    about = {"classification": look.describe(), "scalars": read.name}
+    request = GenerationRequest(read, table, view, size, options, device, progress, about)
     from pyvista_vdi.quality.targets import generate_anywhere, warn_missed
 
     vdi: Any
-    if deferral.deferred:
+    if keeps:
         vdi = generate_deferred(request, deferral, lambda it: generate_anywhere(it, target, client))
     else:
         vdi = generate_anywhere(request, target, client)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import re
-from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from pyvista_vdi import registry
 from pyvista_vdi._version import __version__
 from pyvista_vdi.cli.declare import add
 from pyvista_vdi.cli.verbs import VERBS
+from pyvista_vdi.model.checks import suggestion
 
 
 class UsageError(Exception):
@@ -46,7 +45,7 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
         print(f"pyvista-vdi {__version__}")
         return None
     if name not in known:
-        raise UsageError(f"there is no subcommand {name!r}: {_suggestion(name, [*known])}")
+        raise UsageError(f"there is no subcommand {name!r}: {suggestion(name, [*known], 0.5)}")
     verb = known[name]
     parser = _Parser(
         prog=f"pyvista-vdi {name}",
@@ -67,7 +66,7 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
         return None
     if unknown:
         argument = next(text for text in rest if text.startswith(unknown[0]))  # with its value
-        hint = _suggestion(argument.split("=")[0], options)
+        hint = suggestion(argument.split("=")[0], options, 0.5)
         raise UsageError(f"{name} takes no argument {argument!r}: {hint}")
     return found
 
@@ -80,8 +79,3 @@ def _run(options: argparse.Namespace) -> int:
 
         get_runtime(options.device)  # a wrong name is said before minutes of reading
     return int(function(options))
-
-
-def _suggestion(name: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"

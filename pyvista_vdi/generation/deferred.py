@@ -124,16 +124,13 @@ def kept_range(
             "ambient occlusion follows from opacities, which a deferred VDI does not have: leave "
             "ambient_occlusion out, or classification='deferred'"
         )
-    asked = volume.finite_range() if deferral.value_range is None else deferral.value_range
-    low, high = as_range(asked)
+    if deferral.value_range is not None:  # which has been checked
+        return as_range(deferral.value_range)
+    low, high = volume.finite_range()
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InvalidArgumentError(
-            f"value_range must be two finite scalars, low < high; got {asked!r}"
-            + (
-                ", as the volume's: give value_range=(low, high)"
-                if deferral.value_range is None
-                else ""
-            )
+            f"value_range must be two finite scalars, low < high; got {(low, high)}, as the "
+            "volume's: give value_range=(low, high)"
         )
     return low, high
 

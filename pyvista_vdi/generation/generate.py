@@ -1,5 +1,6 @@
 """Volume to VDI, on a device: rays are marched, what they record is merged, and packed."""
 
+from dataclasses import asdict
 from typing import Any
 
 from pyvista_vdi._version import __version__
@@ -97,9 +98,9 @@ def made_from(
         "device": device,
     }
     if transfer_function.shading is not None:
-        made_by["lights"] = options.lights.to_dict()
-    if options.ambient_occlusion is not None:
-        made_by["ambient_occlusion"] = options.ambient_occlusion.to_dict(volume)
+        made_by["lights"] = asdict(options.lights)
+    if (occlusion := options.ambient_occlusion) is not None:
+        made_by["ambient_occlusion"] = {**asdict(occlusion), "radius": occlusion.radius_in(volume)}
     return made_by
 
 
@@ -107,6 +108,3 @@ def report(progress: Progress | None, fraction: float) -> None:
     """Report how far generation is, and raise Cancelled if the answer is False."""
     if progress is not None and progress(fraction) is False:
         raise Cancelled(f"generation was cancelled at {fraction:.0%}")
-
-
-__all__ = ["Progress", "generate_vdi", "made_from", "report"]

@@ -216,10 +216,10 @@ class GrowingLists(contextlib.AbstractContextManager["GrowingLists"]):
         for array in self._arrays.values():
             array.reserve(end, self._most)
         begin -= begin % alignment  # so many elements are aligned as well
-        room = min(array.room for array in self._arrays.values())
+        room = min(len(grown.array) for grown in self._arrays.values())
         self._begin, self._end = begin, max(end, min(room, begin + self._largest))
-        for name, array in self._arrays.items():
-            part: NDArray[Any] = array.part(begin, self._end)
+        for name, grown in self._arrays.items():
+            part = grown.array[begin : self._end]
             target = self._runtime.result(part.shape, name=_ARRAYS[name][0], out=part)
             self._targets[name] = target
 
@@ -229,7 +229,7 @@ class GrowingLists(contextlib.AbstractContextManager["GrowingLists"]):
         for name, target in self._targets.items():
             if not in_place:
                 self._arrays[name].reserve(made, self._most)
-            self._runtime.download(target, self._arrays[name].part(self._begin, made))
+            self._runtime.download(target, self._arrays[name].array[self._begin : made])
         if in_place:
             self._release_targets()
 

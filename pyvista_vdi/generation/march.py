@@ -1,12 +1,10 @@
 """Records of a slice's rays: marched and merged, fitted to the budget, and packed."""
 
-from collections.abc import Mapping
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime
 from pyvista_vdi.device.constants import GROUP, RUN_WORDS, block_items
@@ -17,7 +15,7 @@ from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.ray_forms import Rectangle, check_list_space
 from pyvista_vdi.volume.bricks import StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
-from pyvista_vdi.volume.rays import GridRays, RayLaunch, Variant
+from pyvista_vdi.volume.rays import GridRays, RayLaunch
 
 
 class Records(AbstractContextManager["Records"]):
@@ -26,9 +24,9 @@ class Records(AbstractContextManager["Records"]):
     ``rays`` are marched through the ``window``, all or part of V_O's window of ``size``, which
     ``slices`` cut. On the device are their ``forms``, their ``runs`` and merge ``errors``, the
     merge error that each accepts (``thresholds``: ``finest`` until its record has been full), and
-    how many runs it has (``counts``). ``view`` has the numbers of a slice's rays
-    (``RaysOfView``), ``recording`` those of the records, which are shortened to what is kept
-    between chunks of a march.
+    how many runs it has (``counts``). ``march`` has the rays in float64, ``view`` the numbers of a
+    slice's rays (``RaysOfView``), ``recording`` those of the records, which are shortened to what
+    is kept between chunks of a march.
     """
 
     def __init__(
@@ -44,8 +42,7 @@ class Records(AbstractContextManager["Records"]):
         check_list_space(camera, rays.grid.bounds)
         self.runtime, self.rays, self.size, self.slices = runtime, rays, size, slices
         self.window = window or Rectangle(0, size[0], 0, size[1])
-        march = rays.forms(camera, size)
-        self.planes, self.double_float = march.planes, march.double_float
+        self.march = march = rays.forms(camera, size)
         self.depth_origin = march.rays.reference_depth
         self.finest = np.float32(options.finest_error)
         voxel = min(rays.grid.spacing)
@@ -94,7 +91,7 @@ class Records(AbstractContextManager["Records"]):
                 recording=self._budget,
             )
             del records["counts"]
-        records |= {"double_float": self.double_float, "capacity": capacity}
+        records |= {"double_float": march.double_float, "capacity": capacity}
         self._pack = runtime.bind("generation/pack_lists.cl", "pack_lists", **records)
 
     def __exit__(self, *_: object) -> None:
@@ -106,7 +103,7 @@ class Records(AbstractContextManager["Records"]):
         rows = Rectangle(x0, x1, y0 + part.first_row, y0 + part.first_row + part.rows)
         self.items = block_items(x1 - x0, part.rows)
         self.lists = part.rows * (x1 - x0)
-        self.view = self.rays.view(self.size, self.planes, rows)
+        self.view = self.rays.view(self.size, self.march.planes, rows)
         self.runtime.fill(self.counts, np.uint32(0))
         self.runtime.fill(self.thresholds, self.finest)
 
@@ -158,15 +155,13 @@ class March(AbstractContextManager["March"]):
         camera: Camera,
         entering: DeviceBuffer | None = None,
     ) -> None:
-        self._records, self._most_steps = records, medium.most_steps
+        self._records, self._medium = records, medium
         runtime, arguments = records.runtime, medium.medium_arguments(camera)
         # Opacity is summed up from 0 in every run
         compensated = 2 if medium.variant.compensated > 1 else 0
         variant = replace(
-            medium.variant, double_float=records.double_float, compensated=compensated
+            medium.variant, double_float=records.march.double_float, compensated=compensated
         )
-        bricks = medium.bricks is not None
-        self._longest = self._longest_rays(arguments, variant, variant.one_by_one or bricks)
         with ExitStack() as stack:
             self._sampler = None
             if medium.bricks is not None:
@@ -180,7 +175,7 @@ class March(AbstractContextManager["March"]):
                 "generation/march_lists.cl",
                 "march_lists",
                 variant.defines,
-                one_by_one=variant.one_by_one or bricks,
+                one_by_one=variant.one_by_one or medium.bricks is not None,
                 **arguments,
                 forms=records.forms,
                 samples=self._sampler and self._sampler.samples,
@@ -196,11 +191,24 @@ class March(AbstractContextManager["March"]):
         self._buffers.close()
 
     def chunks(self, part: Slice) -> list[Chunk]:
-        """Return the chunks that reach the end of a slice's longest ray."""
+        """Return the chunks that reach the end of any ray of a slice."""
+        records, medium = self._records, self._medium
+        (x0, x1, y0, _), (width, height) = records.window, records.size
+        rows = y0 + part.first_row, y0 + part.first_row + part.rows
+        corners = [(1, x - width / 2, y - height / 2) for x in (x0, x1) for y in rows]
+        # Between an axis' first and last points a ray is as long as they are far from each other,
+        # over its slope, which is affine in the pixel. A voxel, a hundredth and two steps more are
+        # for what float32 rounds
+        per_t = np.reshape(records.march.forms[:6], (2, 3, 2, 3))[:, :, 1] @ np.transpose(corners)
+        slopes, speed = np.abs(per_t[0]).min(axis=1), np.linalg.norm(per_t[1], axis=0).max()
+        slopes[per_t[0].min(axis=1) * per_t[0].max(axis=1) <= 0] = 0
+        with np.errstate(divide="ignore"):
+            length = speed * (medium.volume.dimensions / slopes).min()
+        longest = min(medium.most_steps, 1.01 * length / medium.sample_distance + 2)
         found: list[Chunk] = []
-        first, steps, most = 0, _FIRST_CHUNK_STEPS, self._most_steps
-        while first < min(most, self._longest[part.number]):
-            found.append(Chunk(first, steps, first + steps >= most))
+        first, steps = 0, _FIRST_CHUNK_STEPS
+        while first < longest:
+            found.append(Chunk(first, steps, first + steps >= medium.most_steps))
             first, steps = first + steps, CHUNK_STEPS
         return found
 
@@ -211,26 +219,3 @@ class March(AbstractContextManager["March"]):
         if self._sampler is not None:
             self._sampler.sample(records.view)
         self._launch(records.items, view=records.view)
-
-    def _longest_rays(
-        self, medium: Mapping[str, Any], variant: Variant, one_by_one: bool
-    ) -> NDArray[np.int32]:
-        """Return the steps of the longest ray of each slice: chunks behind them have nothing."""
-        records = self._records
-        runtime, window = records.runtime, records.window
-        with runtime.buffer((len(records.slices),), np.int32, "longest rays") as longest:
-            runtime.fill(longest, np.int32(0))
-            launch = RayLaunch(
-                runtime,
-                "generation/march_lists.cl",
-                "longest_marches",
-                variant.defines,
-                one_by_one=one_by_one,
-                classified=medium["classified"],
-                view=records.rays.view(records.size, records.planes, window),
-                forms=records.forms,
-                slice_rows=records.slices.rows,
-                longest=longest,
-            )
-            launch(block_items(window.x1 - window.x0, window.y1 - window.y0))
-            return runtime.download(longest)

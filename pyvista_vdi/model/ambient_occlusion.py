@@ -7,7 +7,7 @@ such as ambient occlusion" (section 2). Computed is docs/dev/conventions.md, "Am
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -86,10 +86,6 @@ class AmbientOcclusion:
         """Return the radius in a volume, model units; beyond its diagonal nothing occludes."""
         return min(0.05 * volume.length if self.radius is None else self.radius, volume.length)
 
-    def to_dict(self, volume: Grid) -> dict[str, Any]:
-        """Return what can be written to JSON, with the radius in this volume."""
-        return {**asdict(self), "radius": self.radius_in(volume)}
-
 
 @dataclass(frozen=True)
 class OcclusionGrid:
@@ -107,13 +103,13 @@ class OcclusionGrid:
     one or two voxels; then no more.
     """
 
-    cell: tuple[int, int, int]
-    nodes: tuple[int, int, int]
+    cell: tuple[int, ...]
+    nodes: tuple[int, ...]
     step: float
     offsets: NDArray[np.float64]
-    margin: tuple[int, int, int]
-    padded: tuple[int, int, int]
-    samples: tuple[int, int, int]
+    margin: tuple[int, ...]
+    padded: tuple[int, ...]
+    samples: tuple[int, ...]
 
     @classmethod
     def of(cls, volume: Grid, occlusion: AmbientOcclusion) -> OcclusionGrid:
@@ -130,8 +126,9 @@ class OcclusionGrid:
         nodes = -(-(points - 1) // cell) + 1
         offsets = directions[:, None, :] * along[None, :, None]
         margin = np.floor(np.abs(offsets).max(axis=(0, 1))).astype(int) + 1
-        sizes = (margin, nodes + 2 * margin, np.minimum(2 * cell, 4))
-        return cls(_triple(cell), _triple(nodes), radius / steps, offsets, *map(_triple, sizes))
+        sizes = (cell, nodes, margin, nodes + 2 * margin, np.minimum(2 * cell, 4))
+        cells, total, *others = (tuple(each.tolist()) for each in sizes)
+        return cls(cells, total, radius / steps, offsets, *others)
 
     @property
     def nbytes(self) -> int:
@@ -149,8 +146,3 @@ def spread_directions(n: int) -> NDArray[np.float64]:
     angle = i * math.pi * (3 - math.sqrt(5))
     radius = np.sqrt(1 - z**2)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
-
-
-def _triple(values: NDArray[Any]) -> tuple[int, int, int]:
-    x, y, z = (int(v) for v in values)
-    return x, y, z

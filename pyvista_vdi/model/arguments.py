@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import field, make_dataclass, replace
+from dataclasses import field, make_dataclass
 from functools import wraps
 from inspect import Parameter
 from typing import Any
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
+from pyvista_vdi.model.checks import suggestion
 from pyvista_vdi.model.options import (
     RECORDS,
     Deferral,
@@ -35,9 +35,7 @@ def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) ->
         if name in known:
             continue
         elsewhere = (each.elsewhere for each in RECORDS if name in vars(each)["declared"])
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
-        hint = next(filter(None, elsewhere), hint)
+        hint = next(filter(None, elsewhere), suggestion(name, known))
         if "settings" in known and name in options and options[name].setting:
             hint = f"pass it by settings=pyvista_vdi.Settings({name}=...)"
         raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")
@@ -84,50 +82,46 @@ class Settings(_Fields):  # type: ignore[misc]  # noqa: D101 - made of the optio
         object.__setattr__(self, "said", {name: getattr(self, name) for name in given})
 
 
-class Raw:
-    """In place of a record: its options as they are given, to be checked by the function."""
-
-    def __init__(self, record: type[Options]) -> None:
-        self.declared = record.declared
-
-    def checked(self, **given: Any) -> dict[str, Any]:
-        """Return all of the options by their names."""
-        return {name: given.get(name, told.default) for name, told in self.declared.items()}
-
-
 def takes(
     *,
     order: Iterable[str] = (),
     aliases: Mapping[str, str] | None = None,
     returns: Mapping[str, Any] | None = None,
     kinds: Mapping[str, str] | None = None,
+    without: Iterable[str] = (),
     **records: Any,
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Make the options of records the arguments of a function, which gets the records.
 
-    The function has a parameter for each record, by the names of ``records``. Its signature then
-    has the options instead, by keyword, or where ``order`` has their names as positional arguments
-    of that order; and its docstring an entry for each that it does not describe itself.
-    ``aliases`` are other names that are taken as well. ``returns``: what the function returns, by
-    the values of an option; ``kinds``: types of options that are others than declared. What is
-    seldom turned is taken as ``settings``.
+    The function has a parameter for each record, by the names of ``records``, or ``**asked`` for
+    all of them. Its signature then has the options instead, by keyword, or where ``order`` has
+    their names as positional arguments of that order; and its docstring an entry for each that it
+    does not describe itself. ``aliases`` are other names that are taken as well. ``returns``: what
+    the function returns, by the values of an option; ``kinds``: types of arguments that are others
+    than declared; ``without``: options that are not taken. What is seldom turned is taken as
+    ``settings``.
     """
-    options: dict[str, Option] = {}
-    for each in records.values():
-        options |= each.declared
-    for name, kind in (kinds or {}).items():
-        options[name] = replace(options[name], kind=kind)
-    hidden = {name for name, told in options.items() if told.setting}
-    shown = {name: told for name, told in options.items() if name not in hidden}
-    if hidden:
-        what = f"options that are seldom turned; here {', '.join(sorted(hidden))}"
-        shown["settings"] = Option("settings", None, what, kind="Settings | None")
+    options = {n: told for n, told in declared(*records.values()).items() if n not in without}
+    if hidden := sorted([name for name, told in options.items() if told.setting]):
+        options = {name: told for name, told in options.items() if not told.setting}
+        what = f"options that are seldom turned; here {', '.join(hidden)}"
+        options["settings"] = Option("settings", None, what, kind="Settings | None")
     other = aliases or {}
 
     def decorated(function: Callable[..., Any]) -> Callable[..., Any]:
-        signature = _signature(function, records, shown, [*order])
+        own = inspect.signature(function)
+        kept = [each for each in own.parameters.values() if each.name not in (*records, "asked")]
+        made = [each for each in kept if each.kind is Parameter.POSITIONAL_OR_KEYWORD]
+        by_name = kept[len(made) :]
+        listed = [name for name in order if name in options]
+        for name in dict.fromkeys([*listed, *options]):
+            told = options[name]
+            kind = Parameter.POSITIONAL_OR_KEYWORD if name in listed else Parameter.KEYWORD_ONLY
+            of = (kinds or {}).get(name, told.kind)
+            made.append(Parameter(name, kind, default=told.default, annotation=of))
+        signature = own.replace(parameters=[*made, *by_name])
         named = signature.parameters
-        open_ended = any(each.kind is Parameter.VAR_KEYWORD for each in named.values())
+        open_ended = bool(by_name) and by_name[-1].kind is Parameter.VAR_KEYWORD
         called_by = "add_vdi" if function.__name__ == "__call__" else function.__name__
 
         @wraps(function)
@@ -141,36 +135,21 @@ def takes(
             except TypeError as error:
                 raise TypeError(f"{called_by}() {error}") from None
             given |= zip(named, args, strict=False)
-            made = records_of(given, called_by, *records.values())
+            made = records_of(given, called_by, *records.values(), without=without)
             return function(**given, **dict(zip(records, made, strict=True)))
 
-        text = _documented(function.__doc__ or "", shown.values())
+        # The docstring describes options behind the parameters, those apart that it has already
+        text = function.__doc__ or ""
+        section = re.search(r"\n( +)(Returns|Raises)\n", text)
+        at, margin = (section.start(), len(section[1])) if section else (len(text), 4)
+        pattern = rf"^ {{{margin}}}(\w[\w, *]*?)(?: :.*)?$"
+        described = ", ".join(re.findall(pattern, text[:at], re.MULTILINE)).split(", ")
+        new = entries([options[name] for name in options if name not in described], margin)
         vars(called).update(__signature__=signature, returns=returns)
-        called.__doc__ = text
+        called.__doc__ = text[:at].rstrip() + "\n" + new + text[at:]
         return called
 
     return decorated
-
-
-def _signature(
-    function: Callable[..., Any],
-    records: Mapping[str, Any],
-    options: Mapping[str, Option],
-    order: list[str],
-) -> inspect.Signature:
-    """Return the signature of a function with options in place of its records."""
-    own = inspect.signature(function)
-    kept = {each.name: each for each in own.parameters.values() if each.name not in records}
-    for name, told in options.items():
-        kind = Parameter.POSITIONAL_OR_KEYWORD if name in order else Parameter.KEYWORD_ONLY
-        kept[name] = Parameter(name, kind, default=told.default, annotation=told.kind)
-
-    def place(each: Parameter) -> tuple[int, int, bool]:
-        """Return what parameters are sorted by, which is stable."""
-        listed = each.kind is Parameter.POSITIONAL_OR_KEYWORD and each.name in options
-        return each.kind, order.index(each.name) if listed else -1, each.name not in options
-
-    return own.replace(parameters=sorted(kept.values(), key=place))
 
 
 def records_of(
@@ -178,10 +157,12 @@ def records_of(
     function: str,
     *records: Any,
     defaults: Mapping[str, Any] | None = None,
+    without: Iterable[str] = (),
 ) -> list[Any]:
     """Return records of the options that a function was given, which are taken out of ``given``.
 
-    ``settings``, where they are among it, say some of them; ``defaults`` are others than declared.
+    ``settings``, where they are among it, say some of them, but for those ``without`` which it
+    does; ``defaults`` are others than declared.
     """
     settings = given.pop("settings", None)
     if not isinstance(settings, Settings | None):
@@ -189,9 +170,10 @@ def records_of(
     said = dict(defaults or {})
     if settings is not None:
         known = [name for name, told in declared(*records).items() if told.setting]
-        if without := [name for name in settings.given if name not in known]:
+        known = [name for name in known if name not in without]
+        if vain := [name for name in settings.given if name not in known]:
             raise InvalidArgumentError(
-                f"{', '.join(without)} of the settings means nothing to {function}, which has "
+                f"{', '.join(vain)} of the settings means nothing to {function}, which has "
                 f"{', '.join(sorted(known))}: leave it out"
             )
         said |= settings.said
@@ -203,26 +185,10 @@ def records_of(
                 found[name] = given.pop(name)
             elif name in said:
                 found[name] = said[name]
-        made.append(each.checked(**found))
+        made.append(each(**found))
     return made
 
 
 def names_of(*records: Any) -> list[str]:
     """Return the arguments that records of options bring, ``settings`` among them."""
     return [n for n, told in declared(*records).items() if not told.setting] + ["settings"]
-
-
-def _documented(text: str, options: Iterable[Option]) -> str:
-    """Return a docstring with entries behind those of its parameters, for what they lack."""
-    section = re.search(r"\n( +)(Returns|Raises)\n", text)
-    at, margin = (section.start(), len(section[1])) if section else (len(text), 4)
-    head, tail = text[:at], text[at:]
-    described = {
-        name
-        for names in re.findall(rf"^ {{{margin}}}(\w[\w, *]*?)(?: :.*)?$", head, re.MULTILINE)
-        for name in names.split(", ")
-    }
-    new = entries((each for each in options if each.name not in described), margin)
-    if "Parameters\n" not in head:
-        new = f"\n{' ' * margin}Parameters\n{' ' * margin}----------\n{new}"
-    return head.rstrip() + "\n" + new + tail

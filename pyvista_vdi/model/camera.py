@@ -22,9 +22,6 @@ Vector: TypeAlias = Sequence[float] | NDArray[Any]
 #: Largest width or height of a window, in pixels: four times 16k, far beyond any display.
 MAX_WINDOW_EDGE = 65536
 
-#: Arguments of a camera that are vectors, and their lengths.
-_VECTORS = {"position": 3, "focal_point": 3, "view_up": 3, "window_center": 2}
-
 
 def check_window_size(window_size: Sequence[int], *, name: str = "window_size") -> tuple[int, int]:
     """Return width and height in pixels as two Python ints; ``name`` is for errors."""
@@ -90,13 +87,31 @@ class Camera:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        for name, length in _VECTORS.items():
+        lengths = {"position": 3, "focal_point": 3, "view_up": 3, "window_center": 2}
+        for name, length in lengths.items():
             put(self, name, as_vector(getattr(self, name), name, length, InvalidCameraError))
         for name in ("parallel_projection", "use_horizontal_view_angle"):
             put(self, name, as_flag(getattr(self, name), name))
         put(self, "view_angle", as_float(self.view_angle))
         put(self, "parallel_scale", as_float(self.parallel_scale))
-        put(self, "model_transform", _affine(self.model_transform))
+        given = self.model_transform
+        matrix = np.eye(4) if given is None else as_floats(given)
+        finite = matrix.shape == (4, 4) and np.isfinite(matrix).all()
+        if not finite or not np.array_equal(matrix[3], [0, 0, 0, 1]):
+            raise InvalidCameraError(
+                "model_transform must be 4 x 4 finite numbers, affine: with a last row of 0 0 0 1; "
+                f"got {given!r}"
+            )
+        # Scale-free: the determinant against the product of the column lengths (Hadamard's bound)
+        columns = np.abs(matrix[:3, :3]).max(axis=0)  # first, because squares may overflow
+        if columns.all():
+            columns *= np.linalg.norm(matrix[:3, :3] / columns, axis=0)
+        if not columns.all() or abs(np.linalg.det(matrix[:3, :3] / columns)) < 1e-12:
+            raise InvalidCameraError(
+                f"model_transform cannot be inverted: it flattens space; got {given!r}"
+            )
+        matrix.setflags(write=False)
+        put(self, "model_transform", matrix)
         put(self, "_transform", self.model_transform.tobytes())
         _ = self.axes  # which refuses what makes no view
 
@@ -159,9 +174,7 @@ class Camera:
         """
         return registry.method("Camera.to_pyvista")(self)
 
-    def replace(self, **changes: Any) -> Camera:
-        """Return a copy with some arguments of the constructor changed."""
-        return replace(self, **changes)
+    replace = replace
 
     def azimuth(self, degrees: float) -> Camera:
         """Return the view turned about ``view_up`` through the focal point (as VTK's Azimuth)."""
@@ -309,29 +322,6 @@ class Camera:
         turned = arm * math.cos(angle) + _cross(axis, arm) * math.sin(angle)
         turned = turned + axis * (axis @ arm) * (1 - math.cos(angle))
         return self.replace(position=np.asarray(self.focal_point) + turned)
-
-
-def _affine(value: ArrayLike | None) -> Matrix:
-    matrix = np.eye(4) if value is None else as_floats(value)
-    if (
-        matrix.shape != (4, 4)
-        or not np.isfinite(matrix).all()
-        or not np.array_equal(matrix[3], [0, 0, 0, 1])
-    ):
-        raise InvalidCameraError(
-            "model_transform must be 4 x 4 finite numbers, affine: with a last row of 0 0 0 1; "
-            f"got {value!r}"
-        )
-    # Scale-free: the determinant against the product of the column lengths (Hadamard's bound)
-    columns = np.abs(matrix[:3, :3]).max(axis=0)  # first, because squares may overflow
-    if columns.all():
-        columns *= np.linalg.norm(matrix[:3, :3] / columns, axis=0)
-    if not columns.all() or abs(np.linalg.det(matrix[:3, :3] / columns)) < 1e-12:
-        raise InvalidCameraError(
-            f"model_transform cannot be inverted: it flattens space; got {value!r}"
-        )
-    matrix.setflags(write=False)
-    return matrix
 
 
 def _unit(vector: Matrix) -> Matrix:

@@ -83,6 +83,12 @@ def one_of(value: Any, name: str, names: Sequence[str], none: bool = False) -> A
     raise error(f"{name} must be {known}; got {value!r}{hint}")
 
 
+def suggestion(name: str, known: Sequence[str], cutoff: float = 0.6) -> str:
+    """Return the known name that an unknown one is near to, as a question, or all there are."""
+    near = difflib.get_close_matches(name, known, n=1, cutoff=cutoff)
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
+
+
 def check_callback(function: Any) -> None:
     """Raise InvalidArgumentTypeError if ``progress`` is neither a function nor ``None``."""
     if function is not None and not callable(function):
@@ -91,11 +97,8 @@ def check_callback(function: Any) -> None:
 
 def as_range(values: Any) -> tuple[float, float]:
     """Return two numbers as floats, NaN where they are no numbers or not two."""
-    try:
-        low, high = values
-    except (TypeError, ValueError):
-        return math.nan, math.nan
-    return as_float(low), as_float(high)
+    ends = as_floats(values)
+    return tuple(ends.tolist()) if ends.shape == (2,) else (math.nan, math.nan)
 
 
 def as_floats(values: Any) -> NDArray[np.float64]:

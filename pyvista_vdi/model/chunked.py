@@ -46,12 +46,7 @@ class ChunkedArray:
 
     ndim = 3
 
-    def __init__(
-        self,
-        source: Any,
-        *,
-        index: Sequence[int | slice] | None = None,
-    ) -> None:
+    def __init__(self, source: Any, *, index: Sequence[int | slice] | None = None) -> None:
         told = getattr(source, "attrs", {})
         said = [name for name in _PACKING if name in told]
         said += [name for name in _MISSING if name in told and str(told[name]) not in _NAN]

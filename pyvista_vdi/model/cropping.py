@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,9 +59,6 @@ class Cropping:
     regions: int = PRESETS["subvolume"]
     normals: tuple[tuple[float, float, float], ...] = _AXES
 
-    #: Every region.
-    ALL: ClassVar[int] = 2**27 - 1
-
     def __post_init__(self) -> None:
         planes, normals = as_floats(self.planes), as_floats(self.normals)
         if planes.shape != (6,) or np.isnan(planes).any():
@@ -72,9 +69,9 @@ class Cropping:
             )
         regions: Any = self.regions
         flags = as_whole(PRESETS.get(regions, regions) if isinstance(regions, str) else regions)
-        if not 0 <= flags <= Cropping.ALL:
+        if not 0 <= flags < 2**27:
             raise InvalidArgumentError(
-                f"the regions of cropping are 27 flags, 0 to {Cropping.ALL:#x}, or one of "
+                f"the regions of cropping are 27 flags, 0 to {2**27 - 1:#x}, or one of "
                 f"{', '.join(map(repr, PRESETS))}; got {self.regions!r}"
             )
         if normals.shape != (3, 3) or not np.isfinite(normals).all() or not np.linalg.det(normals):
@@ -98,9 +95,17 @@ class Cropping:
         if hasattr(cropping, "GetCroppingRegionFlags"):
             if not cropping.GetCropping():
                 return None
-            planes, normals = _of_image(
-                cropping.GetCroppingRegionPlanes(), cropping.GetDataSetInput()
-            )
+            planes, image = cropping.GetCroppingRegionPlanes(), cropping.GetDataSetInput()
+            normals: Any = _AXES
+            matrix = image.GetDirectionMatrix() if hasattr(image, "GetDirectionMatrix") else None
+            if matrix is not None and not matrix.IsIdentity():
+                # VTK's GPU mapper puts the planes' places into the image's bounds, takes each as a
+                # point on its axis of the model frame, and cuts across the image's axis there
+                elements = [[matrix.GetElement(i, j) for j in range(3)] for i in range(3)]
+                normals = np.linalg.inv(np.array(elements))
+                low, high = np.reshape(image.GetBounds(), (3, 2)).T[..., None]
+                planes = np.clip(np.reshape(planes, (3, 2)), low, high) * np.diag(normals)[:, None]
+                planes = planes.ravel()
             return cls(planes, cropping.GetCroppingRegionFlags(), normals)
         try:
             parts = list(cropping)
@@ -157,19 +162,3 @@ class Cropping:
         if (there & ~kept)[covered].any():
             return cuts, None
         return cuts, np.stack([borders[range(3), first], borders[range(3), last]], axis=1)
-
-
-def _of_image(planes: Sequence[float], image: Any) -> tuple[Any, Any]:
-    """Return planes and normals as VTK's GPU mapper has them for an image.
-
-    It puts the planes' places into the image's bounds, takes each as a point on its axis of the
-    model frame, and cuts across the image's axis where that point lies along it.
-    """
-    matrix = image.GetDirectionMatrix() if hasattr(image, "GetDirectionMatrix") else None
-    if matrix is None or matrix.IsIdentity():
-        return planes, _AXES
-    normals = np.array([[matrix.GetElement(i, j) for j in range(3)] for i in range(3)])
-    normals = np.linalg.inv(normals)
-    low, high = np.reshape(image.GetBounds(), (3, 2)).T[..., None]
-    places = np.clip(np.reshape(planes, (3, 2)), low, high) * np.diag(normals)[:, None]
-    return places.ravel(), normals

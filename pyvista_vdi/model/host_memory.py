@@ -30,21 +30,17 @@ class GrowingArray:
     """A float32 array whose number of elements is known when the last one is written.
 
     Systems take memory as it is written, so room for the most that there may be costs nothing. Only
-    where that is refused do its elements, of the shape ``item``, move when it grows.
+    where that is refused do its elements, of the shape ``item``, move when it grows. ``array`` are
+    those that there is room for, to be written, until another method is called.
     """
 
     def __init__(self, item: tuple[int, ...] = ()) -> None:
-        self._item, self._array = item, aligned_empty((0, *item), np.float32)
-
-    @property
-    def room(self) -> int:
-        """Elements that there is room for."""
-        return len(self._array)
+        self._item, self.array = item, aligned_empty((0, *item), np.float32)
 
     def reserve(self, n: int, most: int) -> None:
         """Make room for at least n elements (MemoryError), for the most if it can be had."""
         for room in (most, 2 * n, n):
-            if n <= self.room:
+            if n <= len(self.array):
                 return
             try:
                 larger = aligned_empty((room, *self._item), np.float32)
@@ -52,21 +48,17 @@ class GrowingArray:
                 if room == n:
                     raise
                 continue
-            larger[: self.room] = self._array
-            self._array = larger
-
-    def part(self, first: int, last: int) -> NDArray[Any]:
-        """Return elements to write, a view that is valid until the next call of another method."""
-        return self._array[first:last]
+            larger[: len(self.array)] = self.array
+            self.array = larger
 
     def finished(self, n: int) -> NDArray[Any]:
         """Return the first n elements; the room for others is given back."""
-        raw: Any = self._array.base
-        start = self._array.ctypes.data - raw.ctypes.data
-        end = start + self._array[:n].nbytes
+        raw: Any = self.array.base
+        start = self.array.ctypes.data - raw.ctypes.data
+        end = start + self.array[:n].nbytes
         raw.resize(end, refcheck=False)
-        self._array = raw[start:end].view(np.float32).reshape(n, *self._item)
-        return self._array
+        self.array = raw[start:end].view(np.float32).reshape(n, *self._item)
+        return self.array
 
 
 def require_host_memory(nbytes: int, what: str, remedy: str, *, free: bool = False) -> None:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import (
-    InvalidVDIError,
-    InvalidVolumeError,
-    InvalidVolumeTypeError,
-)
+from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError, InvalidVolumeTypeError
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.volume import Volume
+
+#: The volume that was made of each VTK image last, by the image's id: what it was made of, which
+#: changes with the image, and the image, whose end is its end.
+_kept: dict[int, tuple[tuple[Any, ...], Volume, weakref.ref[Any]]] = {}
 
 
 def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Volume:
@@ -39,7 +39,16 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
     if hasattr(volume, "GetClassName"):
         if scalars is not None and not isinstance(scalars, str):
             volume, scalars = registry.method("Volume.with_scalars")(volume, scalars, None)
-        return _kept_volume(volume, scalars, preference)
+        # What was made of the image last is the same until the image is told to be modified
+        matrix = getattr(volume, "GetDirectionMatrix", None)
+        made_of = (scalars, preference, volume.GetMTime(), matrix and matrix().GetMTime())
+        kept = _kept.get(id(volume))
+        if kept is not None and kept[0] == made_of:
+            return kept[1]
+        made = Volume.from_vtk(volume, scalars, preference)
+        forget = functools.partial(_kept.pop, id(volume), None)
+        _kept[id(volume)] = made_of, made, weakref.ref(volume, lambda _: forget())
+        return made
     if isinstance(volume, np.ndarray):
         raise InvalidVolumeError(
             f"got a NumPy array of shape {volume.shape}, which has no spacing: "
@@ -49,24 +58,6 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
         "expected a pyvista.ImageData, a vtkImageData, a pyvista_vdi.Volume or a file's path; "
         f"got {_described(volume)}"
     )
-
-
-#: The volume that was made of each VTK image last, by the image's id: what it was made of, which
-#: changes with the image, and the image, whose end is its end.
-_kept: dict[int, tuple[tuple[Any, ...], Volume, weakref.ref[Any]]] = {}
-
-
-def _kept_volume(image: Any, scalars: str | None, preference: str) -> Volume:
-    """Return the volume that a VTK image is, the same until the image is told to be modified."""
-    matrix = getattr(image, "GetDirectionMatrix", None)
-    made_of = (scalars, preference, image.GetMTime(), matrix and matrix().GetMTime())
-    kept = _kept.get(id(image))
-    if kept is not None and kept[0] == made_of:
-        return kept[1]
-    volume = Volume.from_vtk(image, scalars, preference)
-    forget = functools.partial(_kept.pop, id(image), None)
-    _kept[id(image)] = made_of, volume, weakref.ref(image, lambda _: forget())
-    return volume
 
 
 def as_vdi(vdi: Any) -> VDI:

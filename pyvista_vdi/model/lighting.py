@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -145,7 +145,7 @@ class Lights:
         Whether a side that faces away from a light is lit as if it faced it (VTK's default).
     """
 
-    lights: tuple[Light, ...] = field(default_factory=lambda: (Light(),))
+    lights: tuple[Light, ...] = (Light(),)
     two_sided: bool = True
 
     @classmethod
@@ -182,7 +182,3 @@ class Lights:
     def of_scene(self) -> bool:
         """Whether any light stands in the world, and does not follow the camera."""
         return any(light.kind == "scene" for light in self.lights)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what can be written to JSON."""
-        return {"lights": [asdict(light) for light in self.lights], "two_sided": self.two_sided}

@@ -79,7 +79,7 @@ _Record = TypeVar("_Record", bound="Options")
 RECORDS: list[type[Options]] = []
 
 
-@dataclass(frozen=True)
+@dataclass
 class Option:
     """An option, as it is declared.
 
@@ -99,20 +99,6 @@ class Option:
     setting: bool = False
     standard: Any = None
 
-    def named(self, name: str, kind: str) -> Option:
-        """Return it with its name, its type, and a check that follows from these."""
-        check, kind = self.check, self.kind or kind
-        alias = getattr(types, kind.removesuffix(" | None"), None)
-        choices = get_args(alias) if get_origin(alias) is Literal else ()
-        if isinstance(check, Number):
-            check = replace(check, name=name, none="None" in kind)
-        elif check is None and choices:
-            check = partial(one_of, name=name, names=choices, none="None" in kind)
-        elif check is None and isinstance(self.default, bool) and kind == "bool":
-            check = partial(as_flag, name=name)
-        standard = self.default if check is None else check(self.default)
-        return replace(self, name=name, kind=kind, check=check, choices=choices, standard=standard)
-
 
 #: What documentation calls the types of ``model/types.py``.
 _WORDS = {
@@ -125,10 +111,8 @@ _WORDS = {
     "MatrixLike": "array_like, shape (4, 4)",
     "OcclusionLike": "bool, float or AmbientOcclusion",
     "OpacityLike": "str or float or array_like",
-    "Policy": '{"auto", "never"}',
     "RangeLike": "float or (float, float)",
     "ScalarsLike": "str or numpy.ndarray",
-    "VolumeLike": "pyvista.DataSet, Volume, path",
     "VTKObject": "vtkVolumeProperty",
 }
 
@@ -168,11 +152,6 @@ class Options:
                 kept = told.standard if value is told.default else told.check(value)
                 object.__setattr__(self, name, kept)
 
-    @classmethod
-    def checked(cls: type[_Record], *given: Any, **named: Any) -> _Record:
-        """Return a record of what a user gave, whatever its types are."""
-        return cls(*given, **named)
-
     @property
     def given(self) -> dict[str, Any]:
         """The options that differ from their defaults; arrays always do."""
@@ -198,8 +177,21 @@ class Options:
 
 def record(cls: type[_Record]) -> type[_Record]:
     """Gather the options that a record's fields declare; for classes, above ``@dataclass``."""
-    told = {each.name: (each.metadata.get("option"), str(each.type)) for each in fields(cls)}
-    cls.declared = {name: each.named(name, kind) for name, (each, kind) in told.items() if each}
+    cls.declared = {each.name: each.metadata["option"] for each in fields(cls) if each.metadata}
+    for each in fields(cls):
+        told = cls.declared.get(each.name)
+        if told is None or told.name:  # it is of the record that this one extends
+            continue
+        told.name, told.kind = each.name, told.kind or str(each.type)
+        none, alias = "None" in told.kind, getattr(types, told.kind.removesuffix(" | None"), None)
+        if isinstance(told.check, Number):
+            told.check = replace(told.check, name=told.name, none=none)
+        elif told.check is None and get_origin(alias) is Literal:
+            told.choices = get_args(alias)
+            told.check = partial(one_of, name=told.name, names=told.choices, none=none)
+        elif told.check is None and told.kind == "bool":
+            told.check = partial(as_flag, name=told.name)
+        told.standard = told.default if told.check is None else told.check(told.default)
     RECORDS.append(cls)
     return cls
 
@@ -210,12 +202,12 @@ def entries(options: Iterable[Option], indent: int = 4) -> str:
     for told in options:
         words = [_WORDS.get(part, part) for part in told.kind.split(" | ") if part != "None"]
         if told.choices:
-            words = ["{" + ", ".join(f'"{each}"' for each in told.choices) + "}"]
+            words = ['{"' + '", "'.join(told.choices) + '"}']
         optional = ", optional" if "None" in told.kind else ""
         text += f"{margin}{told.name} : {' or '.join(words)}{optional}\n"
         said = f"{told.what[0].upper()}{told.what[1:]}. {told.more}".rstrip()
-        lines = textwrap.wrap(said, 100 - indent - 4, break_long_words=False)
-        text += "".join(f"{margin}    {line}\n" for line in lines)
+        inner: Any = {"initial_indent": margin + "    ", "subsequent_indent": margin + "    "}
+        text += textwrap.fill(said, 100, break_long_words=False, **inner) + "\n"
     return text
 
 
@@ -449,8 +441,11 @@ def checked_planes(planes: Any) -> Planes:
 
 @record
 @dataclass(frozen=True)
-class SceneOptions(Options):
-    """What of a VDI, or of a volume, is drawn, and how dense it is."""
+class RenderOptions(Options):
+    """What of a VDI, or of a volume, is drawn, how dense it is, and how exactly.
+
+    Options that compare equal give the same picture of the same view.
+    """
 
     clipping_planes: Any = option(
         None,
@@ -473,16 +468,6 @@ class SceneOptions(Options):
         "2 is twice as dense, as by half of the opacity unit distance.",
         check=Number("a finite factor of the extinction, 0 (transparent) or above"),
     )
-
-
-@record
-@dataclass(frozen=True)
-class RenderOptions(SceneOptions):
-    """How a VDI, or a volume, is drawn.
-
-    Options that compare equal give the same picture of the same view.
-    """
-
     preview_samples: int | None = option(
         None,
         "look a VDI up at so many points of each ray",

@@ -61,18 +61,11 @@ class Arrays(NamedTuple):
         return Arrays(offsets.astype(np.uint64, copy=False), *(array[rows] for array in self[1:]))
 
 
-class Codes(NamedTuple):
-    """What the two words of a supersegment hold, uint32 (n,) each; colours in bits 8 to 31."""
-
-    front: NDArray[np.uint32]
-    back: NDArray[np.uint32]
-    tau: NDArray[np.uint32]
-    color: NDArray[np.uint32]
-
-    def words(self) -> NDArray[np.uint32]:
-        """Return the words, uint32 (n, 2)."""
-        low = self.front | self.back << np.uint32(14) | self.tau << np.uint32(28)
-        return np.stack([low, self.tau >> np.uint32(4) | self.color], axis=1)
+def words_of(*codes: Any) -> NDArray[np.uint32]:
+    """Return the words, uint32 (n, 2), of codes as :meth:`Packed8.codes` returns them."""
+    front, back, tau, color = codes
+    low = front | back << np.uint32(14) | tau << np.uint32(28)
+    return np.stack([low, tau >> np.uint32(4) | color], axis=1)
 
 
 @dataclass(frozen=True)
@@ -94,19 +87,18 @@ class Packed8:
     origins: NDArray[np.int32]
     strides: NDArray[np.uint16]
     words: NDArray[np.uint32]
-    precision = "8-byte"
 
     @property
     def nbytes(self) -> int:
         """Bytes beside the VDI's own arrays."""
         return self.origins.nbytes + self.strides.nbytes + self.words.nbytes
 
-    def codes(self, rows: slice | NDArray[np.int64]) -> Codes:
-        """Return the codes of some supersegments."""
+    def codes(self, rows: slice | NDArray[np.int64]) -> tuple[NDArray[np.uint32], ...]:
+        """Return the codes of some supersegments: front, back, tau, colour in bits 8 to 31."""
         low, high = self.words[rows].T
         mask = np.uint32(DEPTH_CODES)
         tau = low >> np.uint32(28) | (high & np.uint32(0xFF)) << np.uint32(4)
-        return Codes(low & mask, low >> np.uint32(14) & mask, tau, high & np.uint32(0xFFFFFF00))
+        return low & mask, low >> np.uint32(14) & mask, tau, high & np.uint32(0xFFFFFF00)
 
     def arrays(self) -> Arrays:
         """Return the values that it stands for."""
@@ -114,13 +106,13 @@ class Packed8:
         front, back, tau = (aligned_empty(n, np.float32) for _ in range(3))
         color, bits_of_color = aligned_empty((n, 3), np.float32), np.array(_COLOR_BITS, np.uint32)
         for lists, part in _pieces(counts):
-            codes = self.codes(part)
+            *faces, tau_codes, colors = self.codes(part)
             own = np.repeat(np.arange(lists.start, lists.stop), counts[lists])
-            front[part], back[part] = (self.depths(own, code) for code in codes[:2])
-            bits = np.where(codes.tau > 0, codes.tau + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
+            front[part], back[part] = (self.depths(own, face) for face in faces)
+            bits = np.where(tau_codes > 0, tau_codes + np.uint32(TAU_BASE - 1) << np.uint32(16), 0)
             tau[part] = bits.astype(np.uint32).view(np.float32)
             # One multiplication, which every device rounds alike
-            steps = codes.color[:, np.newaxis] >> bits_of_color & np.uint32(_COLOR_STEPS)
+            steps = colors[:, np.newaxis] >> bits_of_color & np.uint32(_COLOR_STEPS)
             color[part] = steps.astype(np.float32) * (np.float32(1) / np.float32(_COLOR_STEPS))
         return Arrays(self.offsets, front, back, color, tau)
 
@@ -152,7 +144,26 @@ def packing_of(arrays: Arrays, nearest: float) -> Packed8:
         # Whole steps, exactly: a division by a power of two; what is before the eye stays there
         faces = np.stack([arrays.front[part], arrays.back[part]], axis=1).astype(np.float64) / step
         np.maximum(faces, np.ceil(max(nearest / step, -(2.0**30))), out=faces)
-        origins[lists], strides[lists], front, back = _depth_codes(faces, counts[lists])
+        # Each list's codes begin at its first front, and are as fine as its extent allows
+        occupied = lists.start + np.flatnonzero(counts[lists])
+        lengths = counts[occupied]
+        first = np.cumsum(lengths) - lengths
+        origin = np.rint(faces[first, 0])
+        span = np.rint(faces[first + lengths - 1, 1]) - origin
+        stride = np.maximum(1, np.ceil(span / DEPTH_CODES))
+        origins[occupied], strides[occupied] = origin, stride
+        own = np.repeat(np.arange(len(occupied)), lengths)
+        depths = np.rint((faces - origin[own, np.newaxis]) / stride[own, np.newaxis])
+        # Keep every back at least 1 behind its front. Rounding keeps faces in order; what it made
+        # equal is moved behind, and where no codes are left behind, before. Less the thicknesses
+        # that must lie before it, a face may equal the one before it
+        within = np.arange(len(depths)) - first[own]
+        needed = np.stack([within, within + 1], axis=1)
+        slack = np.maximum(depths.astype(np.int64), 0) - needed
+        apart = own[:, np.newaxis] << 20  # no list's maximum reaches the next list
+        running = np.maximum.accumulate((slack + apart).reshape(-1)).reshape(-1, 2) - apart
+        most = DEPTH_CODES - lengths[own]
+        front, back = (np.minimum(running, most[:, np.newaxis]) + needed).astype(np.uint32).T
         # Round optical depths to eight significant bits, ties to even, between 2^-18 and 16256
         tau = arrays.optical_depth[part]
         bits = tau.view(np.uint32).astype(np.int64)
@@ -160,7 +171,7 @@ def packing_of(arrays: Arrays, nearest: float) -> Packed8:
         codes = np.where(tau < _LEAST_TAU, 0, np.clip(upper - TAU_BASE + 1, 1, TAU_CODES))
         steps = np.rint(arrays.color[part] * np.float32(_COLOR_STEPS)).astype(np.uint32)
         red, green, blue = (steps << np.array(_COLOR_BITS, np.uint32)).T
-        words[part] = Codes(front, back, codes.astype(np.uint32), red | green | blue).words()
+        words[part] = words_of(front, back, codes.astype(np.uint32), red | green | blue)
     return Packed8(step, arrays.offsets, origins, strides, words)
 
 
@@ -173,34 +184,3 @@ def _pieces(counts: NDArray[np.int64]) -> Iterator[tuple[slice, slice]]:
         last = int(ends[last_list - 1])
         yield slice(first_list, last_list), slice(first, last)
         first_list, first = last_list, last
-
-
-def _depth_codes(
-    faces: NDArray[np.float64], counts: NDArray[np.int64]
-) -> tuple[NDArray[np.int32], NDArray[np.uint16], NDArray[np.uint32], NDArray[np.uint32]]:
-    """Return some lists' origins, strides and codes of fronts and backs.
-
-    ``faces`` are fronts and backs in steps, (n, 2), and ``counts`` the lists' lengths.
-    """
-    origins, strides = np.zeros(len(counts), np.int32), np.zeros(len(counts), np.uint16)
-    occupied = np.flatnonzero(counts)
-    lengths = counts[occupied]
-    first = np.cumsum(lengths) - lengths
-    origin = np.rint(faces[first, 0])
-    span = np.rint(faces[first + lengths - 1, 1]) - origin
-    stride = np.maximum(1, np.ceil(span / DEPTH_CODES))
-    origins[occupied], strides[occupied] = origin, stride
-    own = np.repeat(np.arange(len(occupied)), lengths)
-    codes = np.rint((faces - origin[own, np.newaxis]) / stride[own, np.newaxis]).astype(np.int64)
-    # Keep every back at least 1 behind its front. Rounding keeps faces in order; what it made equal
-    # is moved behind, and where no codes are left behind, before. Less the thicknesses that must
-    # lie before it, a face may equal the one before it
-    within = np.arange(len(codes)) - first[own]
-    needed = np.stack([within, within + 1], axis=1)
-    slack = np.maximum(codes, 0) - needed
-    apart = own[:, np.newaxis] << 20  # no list's maximum reaches the next list
-    running = np.maximum.accumulate((slack + apart).reshape(-1)).reshape(-1, 2) - apart
-    most = DEPTH_CODES - lengths[own]
-    codes = np.minimum(running, most[:, np.newaxis]) + needed
-    front, back = codes.astype(np.uint32).T
-    return origins, strides, front, back

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from pyvista_vdi.model.checks import suggestion
+
 #: Entries of the tables that are made of the control points.
 _ENTRIES = 256
 
@@ -52,5 +54,12 @@ def _arguments(name: str) -> dict[str, Any]:
     }
 
 
+class _Presets(dict[str, dict[str, Any]]):
+    """Presets by their names."""
+
+    def __missing__(self, name: Any) -> Any:
+        raise KeyError(f"there is no preset {name!r}: {suggestion(str(name), [*self])}")
+
+
 #: Arguments of ``add_vdi``, ``add_volume`` and ``generate``, by the looks' names.
-presets: dict[str, dict[str, Any]] = {name: _arguments(name) for name in _POINTS}
+presets = _Presets({name: _arguments(name) for name in _POINTS})

@@ -26,8 +26,6 @@ Floats: TypeAlias = NDArray[np.float64]
 #: Depth before which nothing is looked up in perspective, in diagonals of the bounds ("Lengths").
 NEAREST_DEPTH = 1e-6
 
-_AXES = np.eye(3)
-
 #: Lengths times reciprocal depths beyond which, or below whose reciprocal, float32 loses digits.
 LARGEST_PRODUCT = 1e36
 
@@ -147,7 +145,7 @@ def inverse_affine(matrix: Floats) -> Floats:
 
 
 def box_planes(
-    rays: PixelRays, bounds: Sequence[float], normals: ArrayLike = _AXES
+    rays: PixelRays, bounds: Sequence[float], normals: ArrayLike = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 ) -> list[Floats]:
     """Return the six forms that keep what is inside bounds along normals of the model frame."""
     forms = []
@@ -177,33 +175,27 @@ def view_planes(camera: Camera, rays: PixelRays, planes: Sequence[Sequence[float
     return forms
 
 
-class CroppedRays(NamedTuple):
-    """How a kernel crops: by what it clips to, and what is left.
+def cropped(
+    rays: PixelRays, cropping: Cropping | None, bounds: Sequence[float]
+) -> tuple[list[Floats], list[Floats], int]:
+    """Return how a kernel crops the rays through a box: by what it clips to, and what is left.
 
-    ``planes`` are forms to clip to: a box, or nothing at all. Six ``forms`` are positive beyond the
-    low and the high plane of each axis, for ``opencl/lib/cropping.cl``, none where clipping is
-    enough; ``regions`` are the flags that belong to them.
+    First forms to clip to: a box, or nothing at all. Then six that are positive beyond the low and
+    the high plane of each axis, for ``opencl/lib/cropping.cl``, and the regions that belong to
+    them; none and 0 where clipping is enough.
     """
-
-    planes: list[Floats]
-    forms: list[Floats]
-    regions: int
-
-
-def cropped(rays: PixelRays, cropping: Cropping | None, bounds: Sequence[float]) -> CroppedRays:
-    """Return how the rays through a box are cropped."""
     if cropping is None:
-        return CroppedRays([], [], 0)
+        return [], [], 0
     cuts, box = cropping.within(bounds)
     if box is None:
         normals = np.repeat(cropping.normals, 2, axis=0)
         forms = [rays.form(normal, -at) for normal, at in zip(normals, cuts.ravel(), strict=True)]
-        return CroppedRays([], forms, cropping.regions)
+        return [], forms, cropping.regions
     if np.isnan(box).any():
-        return CroppedRays([np.array([-1.0, 0, 0, 0, 0, 0])], [], 0)  # a plane that keeps nothing
+        return [np.array([-1.0, 0, 0, 0, 0, 0])], [], 0  # a plane that keeps nothing
     if np.array_equal(box, cropping.reach(bounds)):
-        return CroppedRays([], [], 0)
-    return CroppedRays(box_planes(rays, box.ravel().tolist(), cropping.normals), [], 0)
+        return [], [], 0
+    return box_planes(rays, box.ravel().tolist(), cropping.normals), [], 0
 
 
 def direction_forms(
@@ -240,10 +232,7 @@ def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
 
 
 def largest_value(
-    camera: Camera,
-    window_size: Sequence[int],
-    bounds: Sequence[float],
-    forms: Sequence[Floats],
+    camera: Camera, window_size: Sequence[int], bounds: Sequence[float], forms: Sequence[Floats]
 ) -> float:
     """Return the largest magnitude of :func:`pixel_rays`' forms on rays that meet the bounds.
 

@@ -112,9 +112,7 @@ class TransferFunction:
             put(self, "gradient_opacities", factors)
             put(self, "gradient_range", (low, high))
 
-    def replace(self, **changes: Any) -> TransferFunction:
-        """Return a copy with some arguments of the constructor changed."""
-        return replace(self, **changes)
+    replace = replace
 
     def to_dict(self) -> dict[str, Any]:
         """Return what can be written to JSON: the whole table and its range."""

@@ -4,23 +4,20 @@ VTK's and PyVista's objects are told by the methods that they have, so that this
 neither.
 """
 
+import os
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, Union
+from typing import Any, Literal, Protocol, TypeAlias
 
 from numpy.typing import ArrayLike, NDArray
 
+from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
+from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.collection import VDICollection
+from pyvista_vdi.model.cropping import Cropping
+from pyvista_vdi.model.lighting import Light, Lights
 from pyvista_vdi.model.packing import Precision as Precision
-
-if TYPE_CHECKING:
-    import os
-
-    from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
-    from pyvista_vdi.model.camera import Camera
-    from pyvista_vdi.model.collection import VDICollection
-    from pyvista_vdi.model.cropping import Cropping
-    from pyvista_vdi.model.lighting import Light, Lights
-    from pyvista_vdi.model.vdi import VDI, DeferredVDI
-    from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.model.vdi import VDI, DeferredVDI
+from pyvista_vdi.model.volume import Volume
 
 
 class VTKObject(Protocol):
@@ -36,15 +33,15 @@ WindowSize: TypeAlias = Sequence[int]
 Progress: TypeAlias = Callable[[float], object]
 
 #: A path is a file that ``read_volume`` reads.
-VolumeLike: TypeAlias = Union["Volume", VTKObject, str, "os.PathLike[str]"]
-CameraLike: TypeAlias = Union["Camera", VTKObject, Sequence[ArrayLike]]
+VolumeLike: TypeAlias = Volume | VTKObject | str | os.PathLike[str]
+CameraLike: TypeAlias = Camera | VTKObject | Sequence[ArrayLike]
 #: What is shown for one VDI: of a set that which is nearest to the view.
-ShownLike: TypeAlias = Union["VDI", VTKObject, "VDICollection", "DeferredVDI"]
+ShownLike: TypeAlias = VDI | VTKObject | VDICollection | DeferredVDI
 #: What a plotter shows: a volume, or what is made of one already.
 AnyVolume: TypeAlias = VolumeLike | NDArray[Any] | ShownLike
-LightsLike: TypeAlias = Union["Lights", VTKObject, "Sequence[Light | VTKObject]"]
-CroppingLike: TypeAlias = Union["Cropping", VTKObject, Sequence[float], Sequence[object]]
-OcclusionLike: TypeAlias = Union[bool, float, "AmbientOcclusion"]
+LightsLike: TypeAlias = Lights | VTKObject | Sequence[Light | VTKObject]
+CroppingLike: TypeAlias = Cropping | VTKObject | Sequence[float] | Sequence[object]
+OcclusionLike: TypeAlias = bool | float | AmbientOcclusion
 #: A name or an index of the list of devices, or a device in use.
 DeviceLike: TypeAlias = str | int | Any
 #: A client of a Dask cluster, or the address of its scheduler.

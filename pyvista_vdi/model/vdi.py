@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import os
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,19 +21,8 @@ from pyvista_vdi.model.checks import as_bounds, as_number, as_range, as_whole, o
 from pyvista_vdi.model.packing import PRECISIONS, Arrays, Packed8, lengths_of_lists, packing_of
 from pyvista_vdi.model.transfer_function import TransferFunction
 
-if TYPE_CHECKING:
-    import os
-
-Bounds = tuple[float, float, float, float, float, float]
-
 #: What of a camera differs between a view on the screen and one that covers all of a volume.
-_LENS = ("view_angle", "use_horizontal_view_angle", "parallel_scale", "window_center")
-
-
-#: What has arrays that are made when they are asked for, by its ``arrays()``: lists on the device
-#: that made them (``generation/list_arrays.py``), 8-byte supersegments (``model/packing.py``), or
-#: values and a transfer function (:class:`ValuesLook`).
-LateArrays = Any
+LENS = ("view_angle", "use_horizontal_view_angle", "parallel_scale", "window_center")
 
 #: Straight colours and optical depths of supersegments.
 Media = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -53,7 +43,7 @@ class Lists:
     #: Lists along each edge of the viewport.
     window_size: tuple[int, int]
     #: Axis-aligned bounds in the model frame.
-    bounds: Bounds
+    bounds: tuple[float, float, float, float, float, float]
     #: World units, added to every front and back.
     depth_origin: float
     #: How it was made.
@@ -64,7 +54,10 @@ class Lists:
     @property
     def arrays(self) -> Arrays:
         """All arrays, in the order of :class:`VDI`'s arguments; made now if they are not yet."""
-        return self.lists.arrays
+        lists = self.lists
+        if lists._arrays is None:
+            lists._arrays = _read_only(lists.late.arrays())
+        return lists._arrays
 
     @property
     def offsets(self) -> NDArray[np.uint64]:
@@ -96,7 +89,10 @@ class Lists:
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays, with those of the packed form, or of what makes them when asked."""
-        return self.lists.nbytes
+        lists = self.lists
+        if lists._arrays is None:
+            return getattr(lists.late, "nbytes", 0)
+        return sum(array.nbytes for array in lists._arrays) + getattr(lists.packing, "nbytes", 0)
 
     @property
     def precision(self) -> str:
@@ -172,8 +168,9 @@ class VDI(Lists):
         If an element breaks a rule; the message names the element and the rule.
     """
 
-    #: What makes the arrays when they are asked for, if they were not given; not public.
-    late: LateArrays | None
+    #: What makes the arrays when they are asked for, by its ``arrays()``, not public: lists on the
+    #: device that made them, 8-byte supersegments, or values and a transfer function.
+    late: Any
     _arrays: Arrays | None
 
     def __init__(
@@ -199,23 +196,9 @@ class VDI(Lists):
             raise InvalidVDIError(f"metadata must be a dictionary; got {type(metadata).__name__}")
         self.bounds, self.depth_origin = as_bounds(bounds, InvalidVDIError), origin
         self.metadata = dict(metadata or {})
-        arrays = Arrays(
-            _array("offsets", offsets, np.uint64, ()),
-            _array("front", front, np.float32, ()),
-            _array("back", back, np.float32, ()),
-            _array("color", color, np.float32, (3,)),
-            _array("optical_depth", optical_depth, np.float32, ()),
-        )
-        _check(arrays, self.window_size, _nearest(self), origin)
-        self._arrays, self.late = _read_only(arrays), None
-
-    @property
-    def arrays(self) -> Arrays:
-        """All arrays, in the order of the constructor's arguments; made now if they are not yet."""
-        if self._arrays is None:
-            assert self.late is not None
-            self._arrays = _read_only(self.late.arrays())
-        return self._arrays
+        given = (offsets, front, back, color, optical_depth)
+        self._arrays, self.late = _read_only(Arrays(*map(_array, Arrays._fields, given))), None
+        _check(self)
 
     @property
     def lists(self) -> VDI:  # type: ignore[override]
@@ -236,13 +219,6 @@ class VDI(Lists):
     def optical_depth(self) -> NDArray[np.float32]:
         """From front to back along the list's centre ray, float32 (n,)."""
         return self.arrays.optical_depth
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays, with those of the packed form, or of what makes them when asked."""
-        if self._arrays is None:
-            return getattr(self.late, "nbytes", 0)
-        return sum(array.nbytes for array in self._arrays) + getattr(self.packing, "nbytes", 0)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and other processes are given: words of 8 bytes, or arrays."""
@@ -349,25 +325,17 @@ class DeferredVDI(Lists):
             raise InvalidVDIError(
                 f"value_range must be two finite numbers, low < high; got {ends!r}"
             )
+        #: What is stored beside :attr:`lists`, in values that JSON can hold.
+        self.about: dict[str, Any] = {"version": 1, "value_range": [low, high]}
         for name in ("unit_distance", "sample_distance"):
-            length = as_number(about.get(name))
+            length = self.about[name] = as_number(about.get(name))
             if not 0 < length < np.inf:
                 raise InvalidVDIError(f"{name} must be a length above 0; got {about.get(name)!r}")
             setattr(self, name, length)
+        self.about["importance"] = None  # older files say what counted most when lists were cut
         for name in ("camera", "window_size", "bounds", "depth_origin", "metadata"):
             setattr(self, name, getattr(lists, name))
         self.lists = lists
-
-    @property
-    def about(self) -> dict[str, Any]:
-        """What is stored beside :attr:`lists`, in values that JSON can hold."""
-        return {
-            "version": 1,
-            "value_range": list(self.value_range),
-            "unit_distance": self.unit_distance,
-            "sample_distance": self.sample_distance,
-            "importance": None,  # older files say which values counted most when lists were cut
-        }
 
     @cached_property
     def mean(self) -> NDArray[np.float32]:
@@ -445,8 +413,8 @@ class DeferredVDI(Lists):
         return repr(self.lists).replace("VDI(", "DeferredVDI(")[:-1] + f", {low:g} to {high:g})"
 
 
-def made_vdi(arrays: Arrays | LateArrays, like: Lists | None = None, **attributes: Any) -> VDI:
-    """Return a VDI of arrays that this package made, or of what makes them; nothing is checked.
+def made_vdi(arrays: Any, like: Lists | None = None, **attributes: Any) -> VDI:
+    """Return a VDI of ``Arrays`` that this package made, or of what makes them; not checked.
 
     Attributes that are not given are those of ``like``.
     """
@@ -464,8 +432,10 @@ def _nearest(vdi: VDI) -> float:
     return -math.inf if vdi.camera.parallel_projection else -vdi.depth_origin
 
 
-def _array(name: str, values: ArrayLike, dtype: Any, item: tuple[int, ...]) -> NDArray[Any]:
-    """Return an array of a type, whose rows have a shape, or raise InvalidVDIError."""
+def _array(name: str, values: ArrayLike) -> NDArray[Any]:
+    """Return an array of a VDI by its name, of its type and shape, or raise InvalidVDIError."""
+    dtype: Any = np.uint64 if name == "offsets" else np.float32
+    item = (3,) if name == "color" else ()
     try:
         given = np.asarray(values)
     except (TypeError, ValueError) as error:  # lists of different lengths
@@ -493,13 +463,10 @@ def _read_only(arrays: Arrays) -> Arrays:
     return views
 
 
-def _check(arrays: Arrays, size: tuple[int, int], nearest: float, depth_origin: float) -> None:
-    """Raise InvalidVDIError for the first rule that an element breaks.
-
-    ``nearest`` is the least front that is before the eye.
-    """
-    offsets, front, back, color, tau = arrays
-    (width, height), n = size, len(front)
+def _check(vdi: VDI) -> None:
+    """Raise InvalidVDIError for the first rule that an element breaks."""
+    offsets, front, back, color, tau = arrays = vdi.arrays
+    (width, height), n = vdi.window_size, len(front)
     lengths = dict(zip(Arrays._fields[1:], map(len, arrays[1:]), strict=True))
     ends = len(offsets) == width * height + 1 and offsets[0] == 0 and offsets[-1] == n
     if not ends or (offsets[1:] < offsets[:-1]).any() or {*lengths.values()} != {n}:
@@ -518,7 +485,7 @@ def _check(arrays: Arrays, size: tuple[int, int], nearest: float, depth_origin: 
         "front < back": front < back,
         "0 <= color <= 1": ((color >= 0) & (color <= 1)).all(axis=1),
         "optical_depth >= 0 and finite": (tau >= 0) & np.isfinite(tau),
-        "in front of the eye (depth >= 0)": front >= np.float64(nearest),  # compared exactly
+        "in front of the eye (depth >= 0)": front >= np.float64(_nearest(vdi)),  # exactly
         "sorted within its list and not overlapping": ordered,
     }.items():
         if not good.all():
@@ -527,7 +494,7 @@ def _check(arrays: Arrays, size: tuple[int, int], nearest: float, depth_origin: 
             raise InvalidVDIError(
                 f"supersegment {k} (list {i}: pixel x={i % width}, y={i // width}) breaks the "
                 f"rule '{rule}': front {front[k]}, back {back[k]}, color {color[k]}, "
-                f"optical_depth {tau[k]}, depth_origin {depth_origin}"
+                f"optical_depth {tau[k]}, depth_origin {vdi.depth_origin}"
             )
 
 
@@ -561,12 +528,6 @@ def picture_size(window_size: tuple[int, int], metadata: Mapping[str, Any]) -> t
     return window_size
 
 
-def screen_metadata(camera: Camera, window_size: tuple[int, int]) -> dict[str, Any]:
-    """Return what metadata say of the view on the screen whose volume a wider window covers."""
-    lens = {name: getattr(camera, name) for name in _LENS}
-    return {"window_size": list(window_size), **lens, "window_center": list(camera.window_center)}
-
-
 def picture_view(vdi: Any) -> tuple[Camera, tuple[int, int]]:
     """Return the view that a VDI, or one of several, was made for, and the size of its picture.
 
@@ -575,7 +536,7 @@ def picture_view(vdi: Any) -> tuple[Camera, tuple[int, int]]:
     screen: Any = getattr(vdi, "metadata", {}).get("screen")
     camera, size = vdi.camera, getattr(vdi, "picture_size", vdi.window_size)
     try:
-        return camera.replace(**{name: screen[name] for name in _LENS}), size
+        return camera.replace(**{name: screen[name] for name in LENS}), size
     except (TypeError, KeyError, VDIError):  # none, or what somebody has put
         return camera, size
 
@@ -598,8 +559,6 @@ class ValuesLook:
         color, optical_depth = self.media_of(self, slice(None))
         arrays = self.deferred.arrays._replace(color=color, optical_depth=optical_depth)
         rows = np.flatnonzero(optical_depth > 0)
-        if len(rows) == len(optical_depth):
-            return arrays
         return arrays.take(np.searchsorted(rows, arrays.offsets.view(np.int64)), rows)
 
 

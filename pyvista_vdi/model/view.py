@@ -55,9 +55,7 @@ class View:
 
 
 def covering_view(
-    camera: Camera,
-    window_size: Sequence[int],
-    corners: ArrayLike,
+    camera: Camera, window_size: Sequence[int], corners: ArrayLike
 ) -> tuple[Camera, tuple[int, int]] | None:
     """Return a view, and its size, whose window covers the hull of corners, and nothing else.
 
@@ -70,7 +68,6 @@ def covering_view(
     width w in a window of width W has t' = t w / W and c' t' = t (c + (x0 + x1) / W - 1); the same
     in y, and with s for t in parallel projection (docs/dev/conventions.md#list-coordinates).
     """
-    camera = Camera.from_any(camera)
     size = np.asarray(check_window_size(window_size), dtype=np.float64)
     pixels = projected(camera, window_size, np.asarray(corners, dtype=np.float64))
     if pixels is None:

@@ -120,8 +120,22 @@ class Volume(Grid):
         *,
         name: str = "values",
     ) -> None:
-        self.array = _checked_array(array)
-        self.chunked = isinstance(self.array, ChunkedArray)
+        if library_of(array) in ("dask", "zarr", "h5py") and hasattr(array, "chunks"):
+            array = ChunkedArray(array)
+        self.chunked = isinstance(array, ChunkedArray)
+        self.array: Any = array
+        if not self.chunked:
+            try:
+                values = np.asarray(array)
+            except (TypeError, ValueError) as error:  # lists of different lengths
+                raise InvalidVolumeError(f"a volume is an array of numbers: {error}") from error
+            rgba = values.ndim == 4 and values.shape[-1] == 4 and values.dtype == np.uint8
+            if values.ndim != 3 and not rgba:
+                raise InvalidVolumeError(
+                    "a volume is a three-dimensional array, one scalar per point, indexed "
+                    f"[z, y, x], or RGBA as four uint8 per point; got shape {values.shape}"
+                )
+            self.array = held(values)
         self.rgba = self.array.ndim == 4
         nz, ny, nx = self.array.shape[:3]
         if min(nx, ny, nz) < 2:
@@ -222,22 +236,3 @@ class Volume(Grid):
         nx, ny, nz = self.dimensions
         kind = "RGBA" if self.rgba else self.array.dtype
         return f"Volume({nx} x {ny} x {nz} {kind}, spacing={self.spacing})"
-
-
-def _checked_array(values: Any) -> Any:
-    """Return an array as a volume holds it: in memory, or read chunk by chunk."""
-    if isinstance(values, ChunkedArray):
-        return values
-    if library_of(values) in ("dask", "zarr", "h5py") and hasattr(values, "chunks"):
-        return ChunkedArray(values)
-    try:
-        array = np.asarray(values)
-    except (TypeError, ValueError) as error:  # lists of different lengths
-        raise InvalidVolumeError(f"a volume is an array of numbers: {error}") from error
-    rgba = array.ndim == 4 and array.shape[-1] == 4 and array.dtype == np.uint8
-    if array.ndim != 3 and not rgba:
-        raise InvalidVolumeError(
-            "a volume is a three-dimensional array, one scalar per point, indexed [z, y, x], or "
-            f"RGBA as four uint8 per point; got shape {array.shape}"
-        )
-    return held(array)

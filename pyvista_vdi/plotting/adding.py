@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle
-from typing import Any, ClassVar, NamedTuple, get_type_hints
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyvista as pv
@@ -31,10 +31,8 @@ from pyvista_vdi.model.options import (
     Deferral,
     DrawingOptions,
     GenerationOptions,
-    Option,
     Options,
     QualityTarget,
-    declared,
     option,
     record,
 )
@@ -135,19 +133,6 @@ class Addition:
     deferral: Deferral
     drawing: DrawingOptions
 
-    #: The options of all of them.
-    declared: ClassVar[Mapping[str, Option]]
-
-    @classmethod
-    def checked(cls, **given: Any) -> Addition:
-        """Return what was asked for by names of options."""
-        return cls(
-            *(
-                each.checked(**{n: given[n] for n in each.declared if n in given})
-                for each in _RECORDS
-            )
-        )
-
     def __post_init__(self) -> None:
         if self.target:
             refuse_settings(self.target, self.options)
@@ -173,10 +158,6 @@ class Addition:
             )
 
 
-_RECORDS: list[Any] = [each for each in get_type_hints(Addition).values() if isinstance(each, type)]
-Addition.declared = {n: told for n, told in declared(*_RECORDS).items() if n != "lights"}
-
-
 class _Shown(NamedTuple):
     """What an actor shows, its colours, and what its scalar bar says."""
 
@@ -199,15 +180,23 @@ def added(plotter: Any, volume: Any, asked: Addition) -> Any:
 
     # Read what is named, and find what can be shown of it
     if isinstance(volume, str | os.PathLike):
-        volume = _of_file(volume, asked)
-    if isinstance(volume, StoredVolume):
-        volume, asked = _of_store(plotter, volume, asked)
+        named = asked.array.scalars if isinstance(asked.array.scalars, str) else None
+        volume = read_volume(volume, array=named) if holds(volume) is None else read(volume)
+    if isinstance(volume, StoredVolume):  # the level that the view requires
+        camera = Camera.from_any(first_camera(plotter.renderer, volume.bounds))
+        volume, look = volume.in_view(camera, window_size=plotter.window_size), asked.look
+        if look.opacity_unit_distance is None:  # opacities are those of the finest level's voxels
+            look = replace(look, opacity_unit_distance=volume.default_unit_distance)
+        volume, asked = load(volume), replace(asked, look=look)
     several = volume if isinstance(volume, VDICollection) else None
     first = volume if several is None else several[0]  # which all steps, and all views, look like
     if is_vdi_image(first):
         first = vdi_from_image(first)
     if isinstance(first, DeferredVDI):
-        shown = _of_values(first, asked)
+        given = {n: v for n, v in asked.look.given.items() if n == "interpolation"}
+        asked.refuse_with_a_vdi(given)
+        title = str(first.metadata.get("scalars") or "Data")
+        shown = _values_shown(first, asked, first.value_range, first.unit_distance, title)
     elif isinstance(first, VDI):
         shown = _of_vdi(first, asked)
     elif asked.deferral.given:
@@ -267,24 +256,6 @@ def _blocks(plotter: Any, blocks: Any, asked: Addition) -> list[Any]:
     return actors
 
 
-def _of_file(path: Any, asked: Addition) -> Any:
-    """Return the VDI, series, set, store or volume in a file."""
-    if holds(path) is not None:
-        return read(path)
-    scalars = asked.array.scalars
-    return read_volume(path, array=scalars if isinstance(scalars, str) else None)
-
-
-def _of_store(plotter: Any, stored: StoredVolume, asked: Addition) -> tuple[Any, Addition]:
-    """Return the level of a store that the view requires, and opacities of the finest's voxels."""
-    view = Camera.from_any(first_camera(plotter.renderer, stored.bounds))
-    level = stored.in_view(view, window_size=plotter.window_size)
-    if asked.look.opacity_unit_distance is None:
-        look = replace(asked.look, opacity_unit_distance=level.default_unit_distance)
-        asked = replace(asked, look=look)
-    return load(level), asked
-
-
 def _of_vdi(shown: VDI, asked: Addition) -> _Shown:
     """Return a VDI with the colours that it was made with, as far as its metadata has them."""
     asked.refuse_with_a_vdi()
@@ -301,13 +272,6 @@ def _of_vdi(shown: VDI, asked: Addition) -> _Shown:
         table.annotations = annotations
     title = str(shown.metadata.get("scalars") or "Data")
     return _Shown(shown, table, table.scalar_range, title, bar=bar)
-
-
-def _of_values(shown: DeferredVDI, asked: Addition) -> _Shown:
-    """Return a deferred VDI with the property that classifies it."""
-    asked.refuse_with_a_vdi({n: v for n, v in asked.look.given.items() if n == "interpolation"})
-    title = str(shown.metadata.get("scalars") or "Data")
-    return _values_shown(shown, asked, shown.value_range, shown.unit_distance, title)
 
 
 def _of_late_values(volume: Any, asked: Addition) -> _Shown:
@@ -335,19 +299,6 @@ def _of_late_values(volume: Any, asked: Addition) -> _Shown:
     return _values_shown(made, plain, *what, volume.bounds, source.GetCamera())
 
 
-def _refuse_of_values(look: Looks) -> None:
-    """Refuse what of a look no deferred VDI can honour."""
-    lacking = {
-        "shade": "shade=True needs the volume's gradients, which a deferred VDI does not keep",
-        "categories": "categories are of single values, and a deferred VDI keeps means of them",
-    }
-    for name, why in lacking.items():
-        if getattr(look, name):
-            raise UnsupportedError(
-                f"{why}: leave {name} out, or add the volume without classification='deferred'"
-            )
-
-
 def _values_shown(
     values: DeferredVDI | Callable[[View], DeferredVDI],
     asked: Addition,
@@ -358,7 +309,15 @@ def _values_shown(
 ) -> _Shown:
     """Return values with the property that classifies them, as ``add_volume`` makes it."""
     look = asked.look
-    _refuse_of_values(look)
+    lacking = {
+        "shade": "shade=True needs the volume's gradients, which a deferred VDI does not keep",
+        "categories": "categories are of single values, and a deferred VDI keeps means of them",
+    }
+    for name, why in lacking.items():
+        if getattr(look, name):
+            raise UnsupportedError(
+                f"{why}: leave {name} out, or add the volume without classification='deferred'"
+            )
     table = look.lookup_table(np.array(value_range))
     prop = look.volume_property(table, unit_distance)
     shown = DeferredInput(values, prop, *late)

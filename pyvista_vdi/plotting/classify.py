@@ -20,7 +20,7 @@ from pyvista_vdi.errors import (
     VDIError,
     warn_external,
 )
-from pyvista_vdi.model.checks import as_float
+from pyvista_vdi.model.checks import as_float, suggestion
 from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.classification import Look
 from pyvista_vdi.model.lighting import Shading
@@ -77,7 +77,13 @@ class Looks(Look):
         if isinstance(self.cmap, pv.LookupTable):
             return self.cmap
         if isinstance(self.cmap, str) and self.cmap in presets:
-            return self._of_preset(self.cmap).lookup_table(scalars)
+            # Its colours, and its range and opacity where none are given; shade is asked for apart
+            preset = presets[self.cmap]
+            look = {"cmap": preset["cmap"], "n_colors": preset["n_colors"]}
+            look |= {} if self.clim is not None else {"clim": preset["clim"]}
+            linear = isinstance(self.opacity, str) and self.opacity == "linear"
+            look |= {"opacity": preset["opacity"]} if linear else {}
+            return replace(self, **look).lookup_table(scalars)
         low, high = _scalar_range(scalars, self.clim)
         if self.log_scale and low <= 0:
             low = sys.float_info.min
@@ -95,16 +101,6 @@ class Looks(Look):
         if isinstance(self.annotations, dict):
             table.annotations = self.annotations
         return table
-
-    def _of_preset(self, name: str) -> Looks:
-        """Return them with a preset's colours, and its range and opacity where none are given."""
-        look = dict(presets[name])
-        if self.clim is not None:
-            del look["clim"]
-        if not (isinstance(self.opacity, str) and self.opacity == "linear"):
-            del look["opacity"]
-        del look["shade"]  # is asked for apart
-        return replace(self, **look)
 
     def volume_property(
         self, table: pv.LookupTable, default_distance: float | None = None, *, rgba: bool = False
@@ -240,18 +236,13 @@ def _apply_opacity(table: pv.LookupTable, opacity: Any, n_colors: int) -> None:
     except (TypeError, ValueError) as error:
         hint = ""
         if isinstance(opacity, str):
-            names = _opacity_names(error)
-            near = difflib.get_close_matches(opacity, names, n=1)
-            hint = f": did you mean {near[0]!r}?" if near else f"; known are {', '.join(names)}"
+            # In PyVista's message: it keeps its table inside a function
+            listed = str(error).partition("[")[2].rstrip("]")
+            names = [name.strip(" '\"") for name in listed.split(",")] if listed else []
+            hint = f": {suggestion(opacity, names)}"
         raise InvalidArgumentError(
             f"opacity={opacity!r} cannot be used{hint or f': {error}'}"
         ) from error
-
-
-def _opacity_names(error: Exception) -> list[str]:
-    """Return the names in PyVista's message: it keeps its table inside a function."""
-    _, _, listed = str(error).partition("[")
-    return [name.strip(" '\"") for name in listed.rstrip("]").split(",")] if listed else []
 
 
 def _checked_opacities(opacity: Any, n_colors: int) -> Any:

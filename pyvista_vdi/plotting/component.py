@@ -7,7 +7,7 @@ import io
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 import pyvista as pv
 import pyvista.plotting  # whole: pv.Plotter is missing while another thread imports it
@@ -39,11 +39,12 @@ class AddVDI(Component):
         self._actors: list[Callable[[], Any]] = []
 
     @takes(
-        asked=Addition,
+        **get_type_hints(Addition),
+        without=("lights",),  # they are the plotter's
         order=inspect.signature(pv.Plotter.add_volume).parameters,
         aliases={"rng": "clim", "colormap": "cmap", "backface_culling": "culling"},
     )
-    def __call__(self, volume: AnyVolume, asked: Addition) -> PlotterVDIActor | list[Any]:
+    def __call__(self, volume: AnyVolume, **asked: Any) -> PlotterVDIActor | list[Any]:
         """Add a volume that turns fluently: frames are raycast from its VDI where it serves.
 
         All arguments of ``Plotter.add_volume`` are taken, with its names, defaults and meaning;
@@ -97,8 +98,8 @@ class AddVDI(Component):
         >>> plotter.show()  # doctest: +SKIP
         """
         plotter = self._plotter
-        asked = replace(asked, look=replace(asked.look, theme=plotter.theme))
-        made: Any = added(plotter, volume, asked)
+        look = replace(asked.pop("look"), theme=plotter.theme)
+        made: Any = added(plotter, volume, Addition(look=look, **asked))
         found = [made]
         while found:  # lists of blocks within blocks
             each = found.pop()

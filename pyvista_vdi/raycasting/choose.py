@@ -57,7 +57,7 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     lists = prepared.switches  # OFFSET_T, PACKED; DOUBLE_FLOAT_RAYS where it is needed
     compensated = summation(options.preview_samples or prepared.most_media)
     sums: dict[str, int | str] = {"COMPENSATED": compensated}
-    double_float, cropped = prepared.double_float, bool(scene.cropped.forms)
+    double_float, cropped = prepared.double_float, scene.regions != 0
     suit_blocks = not double_float and not prepared.long_offsets
 
     if options.preview_samples is not None:

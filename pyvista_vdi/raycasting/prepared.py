@@ -266,8 +266,8 @@ class PreparedVDI:
                 headers = (behind - counts | counts << constants.FIRST_BITS).astype(np.uint64)
                 self.headers = keep(runtime.upload(headers, "list headers"))
                 occupied = np.flatnonzero(counts)
-                first = packing.codes(offsets[occupied]).front
-                last = packing.codes(offsets[occupied + 1] - 1).back
+                first = packing.codes(offsets[occupied])[0]
+                last = packing.codes(offsets[occupied + 1] - 1)[1]
                 ends = np.stack([packing.depths(occupied, each) for each in (first, last)], axis=1)
             else:
                 made_on: Any = getattr(vdi.late, "on", None)

@@ -104,7 +104,7 @@ class Scene:
     #: t at which each ray ends, (H, W), top row first; None if nothing opaque ends them.
     ends: NDArray[np.float32] | None
     reference_depth: float  # view depth of t = 0, world units
-    cropped: rays.CroppedRays
+    regions: int  # that cropping keeps; 0 where clipping is enough
     #: What counts as a hit, where t of each ray's first one is asked for and no picture.
     hit: FirstHit | None = None
     #: Whether segments are asked for, to be merged with those of other VDIs.
@@ -127,7 +127,7 @@ class Scene:
         # The opacity multiplier is in the lengths that kernels measure by these forms: a length
         # times m absorbs as m times the extinction
         direction = rays.direction_forms(pixel_rays, size, options.opacity_multiplier)
-        cropped = rays.cropped(pixel_rays, options.cropping, prepared.bounds)
+        cut, beyond, regions = rays.cropped(pixel_rays, options.cropping, prepared.bounds)
         # Keep what is in the bounds, in V_O's viewport and in front of its eye, and in the view
         u, v, _, denominator = coordinates
         wide, high = (edge / 2 * denominator for edge in prepared.window)
@@ -136,8 +136,8 @@ class Scene:
         if not prepared.parallel:
             planes.append(denominator - prepared.nearest * np.eye(6)[0])
         planes += rays.view_planes(camera, pixel_rays, options.clipping_planes)
-        planes += cropped.planes
-        forms = [*coordinates, *direction, *planes, *cropped.forms]
+        planes += cut
+        forms = [*coordinates, *direction, *planes, *beyond]
         return cls(
             prepared,
             camera,
@@ -147,7 +147,7 @@ class Scene:
             len(planes),
             rays.checked_opaque_depth(request.opaque_depth, size, pixel_rays),
             pixel_rays.reference_depth,
-            cropped,
+            regions,
             hit,
             segments,
         )
@@ -236,7 +236,7 @@ class Scene:
                 "slabs_per_depth": occupancy.slabs_per_depth,
                 "depth_step": prepared.depth_step,
                 "nearest_offset": prepared.nearest - prepared.depth_origin,
-                "regions": self.cropped.regions,
+                "regions": self.regions,
                 "one_list": self.one_list,
             },
         }

@@ -41,10 +41,8 @@ class ClippedRays:
         options = request.options
         march = medium.rays.forms(request.camera, request.size, options.clipping_planes)
         self.ends = rays.checked_opaque_depth(request.opaque_depth, request.size, march.rays)
-        cropped = rays.cropped(march.rays, options.cropping, medium.volume.bounds)
-        self.planes = march.planes + len(cropped.planes)
-        self.forms = march.packed(*cropped.planes, *cropped.forms)
-        self.regions = cropped.regions
+        cut, beyond, self.regions = rays.cropped(march.rays, options.cropping, medium.volume.bounds)
+        self.planes, self.forms = march.planes + len(cut), march.packed(*cut, *beyond)
         self.variant = replace(medium.variant, double_float=march.double_float)
 
     def uploaded(

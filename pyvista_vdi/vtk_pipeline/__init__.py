@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActor as VDIActor
     from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapper as VDIMapper
+    from pyvista_vdi.vtk_pipeline.drawing.window import VDIStatus as VDIStatus
     from pyvista_vdi.vtk_pipeline.filters.convert import vdi_from_image as vdi_from_image
     from pyvista_vdi.vtk_pipeline.filters.convert import vdi_to_image as vdi_to_image
     from pyvista_vdi.vtk_pipeline.filters.convert import volume_from_vtk as volume_from_vtk
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
         transfer_function_from_property as transfer_function_from_property,
     )
     from pyvista_vdi.vtk_pipeline.filters.source import VDISource as VDISource
-    from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus as VDIStatus
 
 #: Public name to module. Loaded when asked for: converters must not load VTK's OpenGL modules.
 _MODULES = {
@@ -26,7 +26,7 @@ _MODULES = {
     "VDIMapper": "drawing.mapper",
     "VDIReader": "filters.files",
     "VDISource": "filters.source",
-    "VDIStatus": "interaction.status",
+    "VDIStatus": "drawing.window",
     "VDIToImage": "filters.image",
     "VDIWriter": "filters.files",
     "transfer_function_from_property": "filters.properties",

@@ -62,22 +62,19 @@ _DEBIAN = "libgl1 libegl1 libgl1-mesa-dri libx11-6 libxrender1 libxcursor1 libxf
 def __getattr__(name: str) -> Any:
     if not name.startswith(("vtk", "VTK", "numpy_to", "mutable", "reference", "calldata")):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    try:
-        value = _found(name)
-    except ImportError as error:
-        raise explain_import_error(error) from error
-    globals()[name] = value
-    return value
-
-
-def _found(name: str) -> Any:
-    """Return what has a name in one of VTK's modules, or the module of that name."""
+    value = None
     for home in _MODULES.split() if name not in _MODULES else ():
         with suppress(ImportError):  # a build may lack some
-            module = import_module(f"{BACKEND}.{home}")
-            if hasattr(module, name):
-                return getattr(module, name)
-    return import_module(f"{BACKEND}.{name}")
+            value = getattr(import_module(f"{BACKEND}.{home}"), name, None)
+        if value is not None:
+            break
+    else:  # it is a module's name
+        try:
+            value = import_module(f"{BACKEND}.{name}")
+        except ImportError as error:
+            raise explain_import_error(error) from error
+    globals()[name] = value
+    return value
 
 
 def weakly(thing: Any) -> Callable[[], Any]:

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 import reference
 import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
 
-from pyvista_vdi import (
-    Light,
-    Lights,
-    Shading,
-    TransferFunction,
-    Volume,
-)
+from pyvista_vdi import Light, Lights, Shading, TransferFunction, Volume
 
 WINDOW = (7, 6)
 PLACE = ("spacing", "origin", "direction")
@@ -125,7 +121,7 @@ def test_a_vdi_has_the_light_in_its_colours(runtime):
     vdi = generate_vdi(volume, camera, WINDOW, function, lights=lights, device=runtime)
     expected = reference.volume_image(volume, camera, WINDOW, function, lights=lights)
     np.testing.assert_allclose(render_vdi(vdi, camera, device=runtime), expected, atol=TOLERANCE)
-    assert vdi.metadata["lights"] == lights.to_dict()
+    assert vdi.metadata["lights"] == asdict(lights)
     assert TransferFunction.from_dict(vdi.metadata["transfer_function"]) == function
     own = reference.build_vdi(volume, camera, WINDOW, function, lights=lights)
     np.testing.assert_allclose(reference.render(own, camera), expected, atol=1e-5)

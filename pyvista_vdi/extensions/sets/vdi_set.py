@@ -22,7 +22,7 @@ from pyvista_vdi.extensions.sets import EXTENSION
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera, check_window_size
-from pyvista_vdi.model.checks import as_float, as_floats
+from pyvista_vdi.model.checks import as_float, as_vector
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import eye_from_centre
@@ -104,10 +104,8 @@ class VDISet(VDICollection):
         self.window_size = check_window_size(
             self[0].picture_size if window_size is None else window_size
         )
-        given = as_floats(self[0].bounds if bounds is None else bounds)
-        if given.shape != (6,) or not np.isfinite(given).all():
-            raise InvalidArgumentError(f"bounds must be six finite numbers; got {bounds!r}")
-        self.bounds: tuple[float, ...] = tuple(given.tolist())
+        given = self[0].bounds if bounds is None else bounds
+        self.bounds: tuple[float, ...] = as_vector(given, "bounds", 6)
         for i, vdi in enumerate(self if bounds is None else ()):
             if vdi.bounds != self.bounds:
                 raise InvalidVDIError(

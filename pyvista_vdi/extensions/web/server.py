@@ -343,7 +343,7 @@ def serve(
         If aiohttp is not installed.
     """
     looks = Classification.composited(classification, "serve", [*(serve.__kwdefaults__ or ())])
-    options = GenerationOptions.checked(
+    options = GenerationOptions(
         max_supersegments=max_supersegments,
         sample_distance=sample_distance,
         ambient_occlusion=AmbientOcclusion.from_any(ambient_occlusion),

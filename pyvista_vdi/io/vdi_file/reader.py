@@ -47,8 +47,8 @@ from pyvista_vdi.model.packing import (
     PRECISIONS,
     TAU_CODES,
     Arrays,
-    Codes,
     Packed8,
+    words_of,
 )
 from pyvista_vdi.model.vdi import VDI, DeferredVDI, made_vdi
 
@@ -451,5 +451,5 @@ def packed_of_stored(
         offsets,
         origins.astype(np.int32),
         strides.astype(np.uint16),
-        Codes(*(code.astype(np.uint32, copy=False) for code in codes)).words(),
+        words_of(*(code.astype(np.uint32, copy=False) for code in codes)),
     )

@@ -9,11 +9,11 @@ from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit, Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
-from pyvista_vdi.vtk_pipeline.drawing.refused import OF_ACTORS, refuse
 from pyvista_vdi.vtk_pipeline.drawing.screen import LOOKUP, place_image
+from pyvista_vdi.vtk_pipeline.drawing.settings import OF_ACTORS, refuse
+from pyvista_vdi.vtk_pipeline.drawing.window import VDIStatus
 from pyvista_vdi.vtk_pipeline.filters.source import input_of
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, framed, size_of
-from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
 from pyvista_vdi.vtk_pipeline.vtk import (
     vtkCamera,
     vtkOpenGLShaderProperty,
@@ -150,7 +150,8 @@ class VDIActorMethods:
 
     @opacity_multiplier.setter
     def opacity_multiplier(self: Any, multiplier: float) -> None:
-        self.GetMapper().SetOpacityMultiplier(multiplier)
+        mapper, _ = self.GetMapper(), self._driver  # which raises without a mapper
+        mapper.SetOpacityMultiplier(multiplier)
 
     def pick(
         self: Any, x: float, y: float, opacity_threshold: float = DEFAULT_OPACITY

@@ -101,7 +101,12 @@ class Box(Algorithm):
             self.place((0, 1, 0, 1, 0, 1))
         if actor is None:
             return
-        far = _is_far(as_array(actor.GetMatrix()), self.image.GetBounds())
+        model, matrix = bounds_corners(self.image.GetBounds()), as_array(actor.GetMatrix())
+        # From the origin of the model frame, or of the world
+        far = any(
+            np.abs(at).max() > _FAR * np.linalg.norm(np.ptp(at, axis=0))
+            for at in (model, model @ matrix[:3, :3].T + matrix[:3, 3])
+        )
         fill_viewport(actor, _EDGE if far else None)
         if far:
             self._far = self.image.GetOrigin(), self.image.GetSpacing()
@@ -130,13 +135,3 @@ class Box(Algorithm):
     def _allocate(self) -> None:
         self.image.AllocateScalars(3, self.components)  # VTK_UNSIGNED_CHAR
         self.image.GetPointData().GetScalars().Fill(0)
-
-
-def _is_far(matrix: Any, bounds: Any) -> bool:
-    """Whether a box is far from the origin of the model frame, or of the world."""
-    model = bounds_corners(bounds)
-    far = [
-        np.abs(at).max() > _FAR * np.linalg.norm(np.ptp(at, axis=0))
-        for at in (model, model @ matrix[:3, :3].T + matrix[:3, 3])
-    ]
-    return any(far)

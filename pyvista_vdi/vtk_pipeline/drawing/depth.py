@@ -49,8 +49,12 @@ def opaque_depth(frames: Sequence[Frame]) -> Image | None:
     window, bound = frame.renderer.GetRenderWindow(), [0]
     window.GetState().vtkglGetIntegerv(_GL_DRAW_FRAMEBUFFER_BINDING, bound)
     corner, size = (frame.origin[0] + left, frame.origin[1] + bottom), (right - left, top - bottom)
-    own = bound[0] == window.GetRenderFramebuffer().GetFBOIndex()
-    z = (_window_depth if own else _framebuffer_depth)(window, corner, size)
+    if bound[0] == window.GetRenderFramebuffer().GetFBOIndex():
+        values, last = vtkFloatArray(), (corner[0] + size[0] - 1, corner[1] + size[1] - 1)
+        window.GetZbufferData(*corner, *last, values)
+        z = vtk_to_numpy(values).reshape(size[::-1])
+    else:
+        z = _framebuffer_depth(window, corner, size)
     if z.min() >= 1.0:
         return None
 
@@ -98,13 +102,6 @@ def _is_before(frames: Sequence[Frame]) -> bool:
             if not known or depths_of(frames[0].to_view, box)[0] < farthest:
                 return True
     return False
-
-
-def _window_depth(window: Any, corner: tuple[int, int], size: tuple[int, int]) -> Image:
-    (x, y), (width, height) = corner, size
-    values = vtkFloatArray()
-    window.GetZbufferData(x, y, x + width - 1, y + height - 1, values)
-    return vtk_to_numpy(values).reshape(height, width)
 
 
 def _framebuffer_depth(window: Any, corner: tuple[int, int], size: tuple[int, int]) -> Image:

@@ -52,12 +52,10 @@ from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Drawn, VolumePictur
 from pyvista_vdi.vtk_pipeline.drawing.overlap import group_of
 from pyvista_vdi.vtk_pipeline.drawing.screen import ImageTexture, NoDepth, place_image
 from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
+from pyvista_vdi.vtk_pipeline.drawing.window import Timer, VDIStatus, Window, now
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
 from pyvista_vdi.vtk_pipeline.filters.source import Request, VDISource
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, camera_of, size_of
-from pyvista_vdi.vtk_pipeline.interaction.status import VDIStatus
-from pyvista_vdi.vtk_pipeline.interaction.timer import Timer
-from pyvista_vdi.vtk_pipeline.interaction.window import Window, now
 
 _log = logging.getLogger(__name__)
 
@@ -495,9 +493,9 @@ class Driver:
             request = source.made_of
             if request is None or request.content != planned.content:
                 request = wanted
-            if planned.in_bricks:  # for pictures of that size
-                request = source.MakeRequest(frame.view)
             assert request is not None
+            if planned.in_bricks and request.screen != frame.view:  # for pictures of that size
+                request = source.MakeRequest(frame.view)
             self._volume = VolumePicture(request, in_bricks=planned.in_bricks)
         return self._volume
 

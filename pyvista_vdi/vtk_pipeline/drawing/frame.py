@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.errors import UnsupportedError
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import bounds_corners
 from pyvista_vdi.quality.costs import RenderMode
 from pyvista_vdi.quality.view_error import angle_from_generating_view
+from pyvista_vdi.vtk_pipeline.drawing.window import Window
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, camera_of, size_of
-from pyvista_vdi.vtk_pipeline.interaction.window import Window
 
 Matrix = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -80,6 +80,12 @@ class Frame:
         (x, y), (width, height) = viewport(renderer) if drawing else tiled(renderer)
         if min(width, height) == 0:
             return None
+        matrix = as_array(actor.GetMatrix()) if matrix is None else matrix
+        if not np.linalg.det(matrix[:3, :3]):  # VTK's cameras are NaN that were reset to it
+            raise InvalidArgumentError(
+                "the actor's matrix flattens space: give a user_matrix, or a scale, that can be "
+                f"inverted; got {matrix.tolist()}"
+            )
         vtk_camera = renderer.GetActiveCamera()
         aspect = renderer.GetTiledAspectRatio()
         # Not GetCompositeProjectionTransformMatrix: that one turns stereo off
@@ -88,7 +94,6 @@ class Frame:
         scale = np.linalg.norm(model_view[2, :3])  # of the camera's model transform
         to_view, lens = view_of(projection @ model_view, width / height, model_view[2] / scale)
         projection[:, 2] *= scale
-        matrix = as_array(actor.GetMatrix()) if matrix is None else matrix
         camera = Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), model_transform=to_view @ matrix, **lens)
         size = (width, height)
         try:

@@ -13,8 +13,7 @@ from typing import Any
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.vtk_pipeline.drawing.driver import Driver
-from pyvista_vdi.vtk_pipeline.drawing.refused import OF_MAPPERS, refuse
-from pyvista_vdi.vtk_pipeline.drawing.settings import add_settings
+from pyvista_vdi.vtk_pipeline.drawing.settings import OF_MAPPERS, add_settings, refuse
 from pyvista_vdi.vtk_pipeline.filters.source import VDISource, input_of
 from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
 

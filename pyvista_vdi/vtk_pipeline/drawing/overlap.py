@@ -18,7 +18,7 @@ from pyvista_vdi.raycasting.multi_vdi import OwnedImage, PlacedVDI, owned_image
 from pyvista_vdi.vtk_pipeline.drawing.depth import ends_of_rays, opaque_depth
 from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, depths_of
 from pyvista_vdi.vtk_pipeline.drawing.images import Drawn
-from pyvista_vdi.vtk_pipeline.interaction.window import ShownVolume, now
+from pyvista_vdi.vtk_pipeline.drawing.window import ShownVolume, now
 
 #: An actor's box must reach so far around a pixel's centre, in pixels along each axis, for the
 #: pixel to be surely drawn, whole, whatever the rasteriser's rounding and anti-aliasing: half a

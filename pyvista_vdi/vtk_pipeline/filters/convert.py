@@ -142,20 +142,21 @@ def scalars_of(
             "this image is a VDI in its VTK form, not a volume: render, add_vdi and VDIMapper "
             "show it as it is"
         )
-    attributes = {"point": image.GetPointData(), "cell": image.GetCellData()}
-    # Of text there is None, which cannot be rendered
-    arrays = {
-        kind: [a for i in range(data.GetNumberOfArrays()) if (a := data.GetArray(i)) is not None]
-        for kind, data in attributes.items()
-    }
-    named = (array.GetName() for found in arrays.values() for array in found)
-    marks = (vtk.vtkDataSetAttributes.GhostArrayName(), BLANKED)
-    names = [name for name in dict.fromkeys(named) if name not in marks]
+    attributes = [image.GetPointData(), image.GetCellData()]
     if name is None:
         # Active scalars: points first, whatever the preference, as pyvista's active_scalars
-        for data in attributes.values():
+        for data in attributes:
             if data.GetScalars() is not None:
                 return data.GetScalars()
+    # Of text there is None, which cannot be rendered
+    arrays = [
+        [a for i in range(data.GetNumberOfArrays()) if (a := data.GetArray(i)) is not None]
+        for data in attributes
+    ]
+    marks = (vtk.vtkDataSetAttributes.GhostArrayName(), BLANKED)
+    named = [array.GetName() for found in arrays for array in found]
+    names = [name for name in dict.fromkeys(named) if name not in marks]
+    if name is None:
         if len(names) != 1:
             raise InvalidVolumeError(
                 f"the volume has no active scalars; its arrays are {names}: name one"
@@ -163,8 +164,8 @@ def scalars_of(
                 else "the volume has no scalars: there is nothing to render"
             )
         name = names[0]
-    for kind in sorted(arrays, key=lambda kind: kind != preference):
-        for array in arrays[kind]:
+    for found in arrays if preference == "point" else arrays[::-1]:
+        for array in found:
             if array.GetName() == name:
                 return array
     raise UnknownArrayError(f"the volume has no array {name!r}: its arrays are {names}")

@@ -10,12 +10,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
 from pyvista_vdi.errors import (
     Cancelled,
     InvalidArgumentError,
+    InvalidArgumentTypeError,
     InvalidVDIError,
     InvalidVolumeError,
 )
@@ -31,7 +32,7 @@ from pyvista_vdi.model.options import (
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import LightsLike
-from pyvista_vdi.model.vdi import VDI, DeferredVDI, screen_metadata
+from pyvista_vdi.model.vdi import LENS, VDI, DeferredVDI
 from pyvista_vdi.model.view import bounds_corners, covering_view
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.quality.targets import generate_to_target, warn_missed
@@ -83,8 +84,17 @@ class Request(GenerationRequest):
         """Return the same from another V_O; the VDI's metadata say the screen's where that is."""
         metadata = {name: entry for name, entry in self.metadata.items() if name != "screen"}
         if (camera, window_size) != (self.screen.camera, self.screen.size):
-            metadata["screen"] = screen_metadata(self.screen.camera, self.screen.size)
+            seen = self.screen.camera.to_dict()
+            metadata["screen"] = {"window_size": [*self.screen.size]} | {n: seen[n] for n in LENS}
         return replace(self, camera=camera, window_size=window_size, metadata=metadata)
+
+
+def _checked_options(options: GenerationOptions) -> GenerationOptions:
+    if not isinstance(options, GenerationOptions):
+        raise InvalidArgumentTypeError(
+            f"options must be GenerationOptions; got {options!r}: of one alone there is a Set"
+        )
+    return options
 
 
 class VDISource(SceneAlgorithm, Input):
@@ -137,6 +147,7 @@ class VDISource(SceneAlgorithm, Input):
         "options",
         "how the VDI is made, all of it at once; lights are set by ``SetLights``",
         GenerationOptions(),
+        _checked_options,
     )
     SetDial, GetDial = accessors(
         "target",
@@ -187,9 +198,12 @@ class VDISource(SceneAlgorithm, Input):
             the VDI is asked for, and other lights make another VDI; lights that merely follow the
             camera do not. What is given as a list is copied now.
         """
-        renderer = lights if hasattr(lights, "GetTwoSidedLighting") else None
-        self.lit_by.Set(renderer)
-        self._change("lights", Lights.from_any(lights), Lights())
+        before, of_renderer = self.lit_by.Get(), hasattr(lights, "GetTwoSidedLighting")
+        self.lit_by.Set(lights if of_renderer else None)
+        if not of_renderer:
+            self._change("lights", Lights.from_any(lights), Lights())
+        elif lights is not before:
+            self.Modified()
 
     def GetLights(self) -> Lights:
         """Return what a shaded volume is lit by; of a renderer, as its lights are now."""
@@ -342,11 +356,12 @@ class VDISource(SceneAlgorithm, Input):
         self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
     ) -> None:
         """Take a renderer's view, unless nothing can be drawn from it; this raises why not."""
+        given, view = self.GetCamera(), None
         if not self.has_view:
-            self.MakeRequest(self.view_for(camera, size, model_transform))
-        given = self.GetCamera()
-        if given is None:
-            self.take_camera(camera, model_transform)
+            view = self.view_for(camera, size, model_transform)
+            self.MakeRequest(view)
+        if given is None and view is not None:
+            self.take_camera(view.camera)
         elif self.of_scene and self._frame_camera is None and self.made_of is None:
             # One that was given with the volume
             self.SetCamera(given.replace(model_transform=model_transform))
@@ -364,7 +379,7 @@ class VDISource(SceneAlgorithm, Input):
             given = given.replace(model_transform=model_transform)
         return View(given, self.GetWindowSize() or size)
 
-    def take_camera(self, camera: Any, model_transform: NDArray[np.float64]) -> None:
+    def take_camera(self, camera: Any, model_transform: ArrayLike | None = None) -> None:
         """Set a renderer's view as that of the next VDI."""
         self.SetCamera(camera, model_transform)
         self._frame_camera = self.GetCamera()

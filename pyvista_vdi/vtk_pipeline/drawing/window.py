@@ -1,4 +1,4 @@
-"""A render window that shows VDIs: its frames, and what tells how good they are to be.
+"""A render window that shows VDIs: its frames, their status, and the timer of what goes on behind.
 
 The only place besides the driver that has a clock. What is chosen by the times of frames is in
 :mod:`pyvista_vdi.quality.rate`.
@@ -10,21 +10,32 @@ import contextlib
 import time
 import weakref
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
+from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.quality.costs import RenderMode
 from pyvista_vdi.quality.rate import Pace
+from pyvista_vdi.quality.targets import describe
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.vtk import (
+    VTK_INT,
+    calldata_type,
     vtkMatrix4x4,
     vtkOpenGLGL2PSHelper,
     vtkVolume,
     vtkWeakReference,
     weakly,
 )
+
+#: Milliseconds between two looks: few, so that a series is played at whatever rate a screen has.
+PERIOD = 10
+#: Of a timer's observer, before others, whose default priority is 0: see :class:`Timer`.
+_PRIORITY = 1.0
 
 #: Cameras remembered per window; more than any scene has viewports that are turned in turn.
 _KNOWN_CAMERAS = 16
@@ -225,26 +236,31 @@ class Window:
         for runtime in {get_runtime(driver.device) for driver in drivers}:
             self._foreground.enter_context(runtime.foreground())
         samples = window.GetMultiSamples()
-        if samples and self.pace.slow_samples and self._may_go_without():
-            self._given_up, samples = samples, 0
-            window.SetMultiSamples(0)
-        # From 9.7 on VTK draws the whole window once more to give the screen a depth buffer, which
-        # nothing reads: window.GetZbufferData reads that of VTK's own framebuffer
-        if self._blit is None and _draws_depth_to_screen(window):
+        if samples and self.pace.slow_samples:
+            # A frame goes without where all VDIs of the window let previews do
+            shown = [(each.driver.settings, r) for r, each in self.shown() if each.visible]
+            cameras = [known() for known in self._known]
+            if shown and all(
+                self.previews(settings)
+                and not self.keeps_picture
+                and renderer.GetActiveCamera() in cameras
+                for settings, renderer in shown
+            ):
+                self._given_up, samples = samples, 0
+                window.SetMultiSamples(0)
+        # From 9.7 on VTK draws a whole window of X11 once more to give the screen a depth buffer,
+        # which nothing reads: window.GetZbufferData reads that of VTK's own framebuffer
+        if (
+            self._blit is None
+            and window.GetClassName() == "vtkXOpenGLRenderWindow"
+            and hasattr(window, "BlitToCurrentWithDepth")
+            and window.GetShowWindow()
+            and window.GetFrameBlitMode() == window.BlitToHardware
+            and not window.GetStereoRender()  # whose two buffers that copy alone fills
+        ):
             self._blit = window.GetFrameBlitMode()
             window.SetFrameBlitModeToBlitToCurrent()
         self.pace.began(samples)
-
-    def _may_go_without(self) -> bool:
-        """Whether a frame may go without multisampling: all VDIs of the window let previews do."""
-        shown = [(each.driver.settings, r) for r, each in self.shown() if each.visible]
-        cameras = [known() for known in self._known]
-        return bool(shown) and all(
-            self.previews(settings)
-            and not self.keeps_picture
-            and renderer.GetActiveCamera() in cameras
-            for settings, renderer in shown
-        )
 
     def _end(self) -> None:
         window = self.vtk_window()
@@ -280,12 +296,158 @@ class Window:
             self._picture_wanted = False
 
 
-def _draws_depth_to_screen(window: Any) -> bool:
-    """Whether a window of X11 copies its depth to the screen with each frame, as from VTK 9.7."""
-    return (
-        window.GetClassName() == "vtkXOpenGLRenderWindow"
-        and hasattr(window, "BlitToCurrentWithDepth")
-        and bool(window.GetShowWindow())
-        and window.GetFrameBlitMode() == window.BlitToHardware
-        and not window.GetStereoRender()  # whose two buffers that copy alone fills
-    )
+class Timer:
+    """Calls something again and again from the event loop, while it runs and no hand moves.
+
+    Worker threads never call VTK. Where an interactor runs no event loop (off-screen), nothing is
+    called; what was done in the background is seen at the next frame then.
+
+    Parameters
+    ----------
+    tick : bound method
+        Held weakly.
+
+    Attributes
+    ----------
+    interactor : callable
+        Returns the interactor, or ``None`` where there is none any more.
+
+    Notes
+    -----
+    While a button is held, VTK's styles take all events of the interactor for themselves, and
+    repeat their last motion at *any* timer event: a ``vtkInteractorStyleTrackballCamera`` would
+    turn on and on. So the timer goes when an interaction starts; motion brings frames of its own,
+    and after the last one the timer is started again. Nor do others get our timer's events: a
+    user's own timer callback counts its steps by them.
+    """
+
+    def __init__(self, tick: Callable[[], None]) -> None:
+        self._tick = weakref.WeakMethod(tick)
+        self.interactor: Callable[[], Any] = lambda: None
+        self._timer = 0
+        self._observers: tuple[int, ...] = ()
+
+    def start(self, interactor: Any) -> None:
+        """Tick, if it does not already, in this interactor."""
+        if interactor is not self.interactor() or interactor is None:
+            self.stop()
+        if interactor is None or self._timer > 0:
+            return
+        if not self._observers:
+            self._observe(interactor)
+        self._timer = interactor.CreateRepeatingTimer(PERIOD)
+
+    def stop(self) -> None:
+        """End: nothing is left at the interactor."""
+        self._pause()
+        interactor = self.interactor()
+        if interactor is not None:
+            for observer in self._observers:
+                interactor.RemoveObserver(observer)
+        self._observers = ()
+
+    def _pause(self) -> None:
+        interactor = self.interactor()
+        if interactor is not None and self._timer > 0:
+            interactor.DestroyTimer(self._timer)
+        self._timer = 0
+
+    def _observe(self, interactor: Any) -> None:
+        weak = weakref.ref(self)
+
+        @calldata_type(VTK_INT)  # type: ignore[misc]
+        def on_timer(caller: Any, _event: str, number: int) -> None:
+            timer = weak()
+            if timer is None:
+                return
+            if number == timer._timer and timer._observers:
+                caller.GetCommand(timer._observers[0]).SetAbortFlag(1)
+            tick = timer._tick()
+            if tick is not None:
+                tick()
+
+        def on_interaction(*_: Any) -> None:
+            timer = weak()
+            if timer is not None:
+                timer._pause()
+
+        ticks = interactor.AddObserver("TimerEvent", on_timer, _PRIORITY)
+        interaction = interactor.AddObserver("StartInteractionEvent", on_interaction)
+        # Or a style that has taken all events would keep it from us
+        interactor.GetCommand(interaction).PassiveObserverOn()
+        self.interactor = weakly(interactor)
+        self._observers = (ticks, interaction)
+
+
+@dataclass(frozen=True)
+class VDIStatus:
+    """How a VDI was drawn in the last frame, and what goes on behind it.
+
+    Attributes
+    ----------
+    mode : {"none", "full", "preview"}
+        Nothing drawn yet, one ray per pixel, or fewer.
+    samples : int
+        Rays that were cast: pixels of the image.
+    full_samples : int
+        Pixels of the viewport.
+    fps : float or None
+        Frames per second of the window: mean of an interaction's last frames; at rest, what the
+        last frame would allow. ``None`` before the first whole frame.
+    angle : float or None
+        Between the view and V_O, degrees; ``None`` without a VDI.
+    magnification : float or None
+        Pixels of the view that are as wide as one of the VDI's lists; ``None`` without a VDI.
+    coverage : float or None
+        Share, 0 to 1, of the view's rays through the volume that the VDI has all of; ``None``
+        without a VDI.
+    ssim : float or None
+        Estimated SSIM of the VDI's picture of this view against volume rendering; ``None`` where
+        nothing asked for it.
+    progress : float or None
+        Share done, 0 to 1, of the VDI that is being made in the background; ``None`` if none is.
+    generation : int
+        How many VDIs were shown so far, this one included.
+    stand_in : bool
+        Whether the volume itself was drawn, because the VDI shows what has changed since.
+    drawn : {"vdi", "volume"}
+        What was raycast: the VDI, or the volume itself, for whatever reason.
+    vdi : VDI or None
+        The one that is shown, or is to be replaced.
+    time : float or None
+        That of the step of a series; ``None`` where no series is shown.
+    """
+
+    mode: Literal["none", "full", "preview"]
+    samples: int
+    full_samples: int
+    fps: float | None
+    angle: float | None
+    ssim: float | None
+    progress: float | None
+    generation: int
+    vdi: VDI | None
+    stand_in: bool = False
+    drawn: RenderMode = "vdi"
+    time: float | None = None
+    magnification: float | None = None
+    coverage: float | None = None
+
+    @property
+    def share(self) -> float:
+        """Share of the viewport's pixels that a ray was cast for, 0 to 1."""
+        return self.samples / self.full_samples if self.full_samples else 0.0
+
+    def __str__(self) -> str:
+        what = f"{self.mode}, the volume itself" if self.drawn == "volume" else self.mode
+        told = [
+            (self.fps, "{:.3g} frames/s"),
+            (self.angle, "{:.0f}° from the generating view"),
+            (self.ssim, "SSIM about {:.3f}"),
+            (self.time, "time {:g}"),
+            (self.generation or None, "VDI no. {}"),
+            (None if self.vdi is None else describe(self.vdi.metadata), "{}"),
+            (self.progress, "making the next: {:.0%}"),
+        ]
+        parts = [f"{what}: {self.share:.0%} of {self.full_samples} pixels"]
+        return ", ".join(parts + [text.format(value) for value, text in told if value is not None])

@@ -1,1 +1,0 @@
-"""What goes on between frames: motion, estimates, regeneration, status."""
