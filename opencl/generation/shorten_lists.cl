@@ -38,15 +38,6 @@ inline void measure_errors(__global const float *records, Int starts, __global f
     }
 }
 
-// How many errors are within thresholds.
-inline Int count_within(__global const float *errors, int most, Real thresholds)
-{
-    Int within = 0;
-    for (int k = 0; k < most - 1; ++k)
-        within += COUNT(LOAD_LANES(0, ERRORS(k)) <= thresholds);
-    return within;
-}
-
 // The pair of the least error; of equals the first.
 inline Int least_error(__global const float *errors, int most)
 {
@@ -103,7 +94,10 @@ inline Int make_room(__global float *records, Int starts, __global float *errors
         const int most = largest_lane(counts);
         measure_errors(records, starts, errors, counts, most, per_reference, hidden_weight);
         for (;;) {
-            const Int low = chosen & (count_within(errors, most, *thresholds) < counts - limit);
+            Int within = 0;
+            for (int k = 0; k < most - 1; ++k)
+                within += COUNT(LOAD_LANES(0, ERRORS(k)) <= *thresholds);
+            const Int low = chosen & (within < counts - limit);
             if (!ANY(low))
                 break;
             *thresholds = SELECT(*thresholds, *thresholds * 4.0f, low);

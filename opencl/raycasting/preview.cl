@@ -66,7 +66,7 @@ inline void enter_stack(Walk *walk, const Cells *cells)
     const int enters = slab_at(cells, fma(walk->r, ray->along.z, ray->deep.z));
     const int leaves = slab_at(cells, walk->z_leave);
     walk->left = cells->lists->masks[walk->stack_j * cells->stacks_wide + walk->stack_i] &
-                 slabs_from(min(enters, leaves)) & slabs_to(max(enters, leaves));
+                 ~0UL << min(enters, leaves) & ~0UL >> (SLABS - 1 - max(enters, leaves));
 }
 
 inline Walk begin_walk(const Cells *cells)
