@@ -25,7 +25,9 @@ from reference.raycast import NEAR_LIMIT
 from sampling_uncertainty import uncertainties
 
 from pyvista_vdi import Camera, Cancelled
+from pyvista_vdi.generation.slices import Slices
 from pyvista_vdi.model.chunked import VOXEL_TYPES
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import Criterion
 from pyvista_vdi.model.volume import Volume
@@ -182,6 +184,11 @@ def test_homogeneity_cuts_where_the_reference_does(runtime):
             near += (np.abs(fronts[:, None] - faces).min(axis=1) <= 0.1 * step).sum()
             total += len(fronts)
     assert near >= 0.97 * total, f"{near} of {total}"
+
+
+def test_more_of_a_ray_is_recorded_where_it_is_cut_at_its_end(runtime):
+    options = [GenerationOptions(criterion=name) for name in get_args(Criterion)]
+    assert [Slices(runtime, (8, 8), each).kept for each in options] == [40, 512]
 
 
 @pytest.mark.parametrize("budget", [7, 600])

@@ -10,10 +10,7 @@ from strategies import kept_values, random_vdi
 import pyvista_vdi as pvdi
 from pyvista_vdi import DeferredVDI, TransferFunction, io
 from pyvista_vdi.cli import main
-from pyvista_vdi.errors import (
-    InvalidArgumentError,
-    InvalidVDIError,
-)
+from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.model.vdi import lengths_of
 
 LOOKS = TransferFunction([[1, 0, 0], [0, 1, 0], [0, 0, 1]], [0, 0.8, 0.3], (100, 300))
@@ -120,6 +117,11 @@ def test_classification_is_the_mean_over_values_of_that_mean_and_spread(default_
     assert at == vdi.n_supersegments
     assert kinds == {(False, False), (True, False), (False, True)}
     assert vdi.metadata["transfer_function"] == LOOKS.to_dict()
+
+
+def test_a_range_of_one_value_is_a_step():
+    look = LOOKS.replace(scalar_range=(200, 200))
+    assert deferred().classified(transfer_function=look).n_supersegments > 0
 
 
 def test_render_takes_the_look(default_runtime):

@@ -136,6 +136,10 @@ def test_vdi_image_and_file_show_the_same(plotter, tmp_path):
     assert np.ptp(images[0].reshape(-1, 3), axis=0).max() > 60
     for image in images[1:]:
         np.testing.assert_array_equal(image, images[0])
+    (bar,) = plotter.scalar_bars.values()
+    colors = [bar.GetLookupTable().GetTableValue(k)[:3] for k in (0, 128, 255)]
+    stored = np.array(vdi.metadata["transfer_function"]["colors"])
+    np.testing.assert_allclose(colors, stored[[0, 128, 255]], atol=0.51 / 255)
 
 
 def test_problem_in_a_frame_is_said_once_and_the_last_image_stays(plotter):

@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import (
-    LOOKS,
-    shown,
-    soft_ball,
-)
+from plugin_scenes import LOOKS, shown, soft_ball
 from pyvista.plotting.plotter import _ALL_PLOTTERS
 
 from pyvista_vdi.errors import UnsupportedError

@@ -5,17 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import (
-    add_nothing,
-    assert_as_vtk,
-    soft_ball,
-)
+from plugin_scenes import add_nothing, assert_as_vtk, soft_ball
 from pyvista import Plotter
 
-from pyvista_vdi.vtk_pipeline.vtk import (
-    vtkAssembly,
-    vtkPropAssembly,
-)
+from pyvista_vdi.vtk_pipeline.vtk import vtkAssembly, vtkPropAssembly
 
 pytestmark = pytest.mark.gl
 

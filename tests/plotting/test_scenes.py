@@ -5,13 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import pyvista as pv
-from plugin_scenes import (
-    WINDOW,
-    add_ours,
-    assert_as_vtk,
-    opaque_sphere,
-    soft_ball,
-)
+from plugin_scenes import WINDOW, add_ours, assert_as_vtk, opaque_sphere, soft_ball
 
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 

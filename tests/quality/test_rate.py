@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from pyvista_vdi.quality.rate import FLOOR, FrameRate
+from pyvista_vdi.quality.rate import FLOOR, FrameRate, Pace
 
 FULL, TARGET, THRESHOLD = 1280 * 720, 30.0, 0.1
 PERIOD = 1 / TARGET
@@ -66,3 +66,17 @@ def test_full_where_that_fits_and_the_floor_where_nothing_does():
     chosen, _, _ = run(lambda k: (2 if k < 50 else 0.5) * (PERIOD - 4e-3) / FULL)
     assert (chosen[10:50] < FULL).all()
     assert (chosen[70:] == FULL).all()
+
+
+@pytest.mark.parametrize(
+    ("work", "beside", "slow"), [(0.012, 0.03, True), (0.012, 0.004, False), (0.2, 0.004, False)]
+)
+def test_multisampling_goes_where_it_makes_frames_late(work, beside, slow):
+    """Not where they are in time with it, nor where rays alone make them late."""
+    pace = Pace()
+    for _ in range(3):
+        pace.began(4)
+        pace.share(30.0, 10_000, FLOOR)
+        pace.drawn((100, 100), (100, 100), work)
+        pace.ended(work + beside, moving=True)
+    assert pace.slow_samples == slow

@@ -89,6 +89,12 @@ def test_pyvistas_nodes_are_taken_exactly():
     )
 
 
+def test_a_layer_of_cells_is_a_volume():
+    grid = pv.ImageData(dimensions=(2, 3, 4))
+    grid.cell_data["c"] = np.arange(6.0)
+    assert volume_from_vtk(grid).dimensions == (2, 3, 4)
+
+
 @given(
     st.lists(st.tuples(st.floats(-50, 50), st.floats(0, 1)), min_size=2, max_size=6),
     st.lists(
