@@ -121,26 +121,16 @@ def method(name: str, otherwise: Any = None) -> Any:
 
     MissingDependencyError is raised where that is ``None``.
     """
-    return _placed("methods", name, otherwise, missing=name)
-
-
-def reader(suffix: str) -> Any:
-    """Return the function that reads volumes from files of that suffix, "" all others, or None."""
-    return _placed("readers", suffix)
-
-
-def generator(name: str) -> Any:
-    """Return a way of generating VDIs."""
-    return _placed("generators", name, missing=f"generating by {name}")
+    return placed("methods", name, otherwise, missing=name)
 
 
 def shown(data: Any) -> Any:
     """Return the function that makes of data what a mapper draws, by their class, or None."""
     kinds = (f"{kind.__module__}:{kind.__qualname__}" for kind in type(data).__mro__[:-1])
-    return next((make for kind in kinds if (make := _placed("shown", kind)) is not None), None)
+    return next((make for kind in kinds if (make := placed("shown", kind)) is not None), None)
 
 
-def _placed(what: str, name: str, otherwise: Any = None, missing: str = "") -> Any:
+def placed(what: str, name: str, otherwise: Any = None, missing: str = "") -> Any:
     """Return what a record places under a name; the core's is looked at first."""
     for each in records():
         if name in getattr(each, what):

@@ -214,7 +214,7 @@ def load(name: str) -> Volume:
 def table_of(volume: Volume, look: str | None, **more: Any) -> Any:
     """Return a standard transfer function of a volume, *soft* unless it says otherwise."""
     arguments = {**TRANSFER_FUNCTIONS[look or "soft"], **more}
-    return Classification.composited(arguments, "a benchmark").transfer_function_of(volume)
+    return Classification(**arguments).transfer_function_of(volume)
 
 
 def benches(options: argparse.Namespace, *, vtk: bool = False) -> Latest:

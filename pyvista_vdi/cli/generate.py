@@ -21,6 +21,7 @@ from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
+from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
@@ -36,7 +37,7 @@ def generate(options: argparse.Namespace) -> int:
     path, file_arguments = checked_target(options.output), file_options(options)
     QualityTarget(**given(options, QualityTarget, flat=True))
     look = classification(options)
-    Classification.composited(look, "generate")
+    records_of(look, "generate", Classification)
     how = given(options, GenerationOptions, QualityTarget, Deferral)
     volume = read_volume(options, in_chunks=True)
     view = generating_view(options, volume)

@@ -21,6 +21,7 @@ from pyvista_vdi.io import write_png
 from pyvista_vdi.measure.bench import as_json
 from pyvista_vdi.measure.compare import contact_sheet, measure, table
 from pyvista_vdi.measure.tradeoff import AXES, COSTS, DEFAULT_AXES, measure_tradeoff, sweep
+from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.plotting.progress import DelayedBar
 
@@ -28,7 +29,7 @@ from pyvista_vdi.plotting.progress import DelayedBar
 def compare(options: argparse.Namespace) -> int:
     """Compare a volume's pictures, and write a table, a picture, a JSON file and the VDI."""
     look = classification(options)
-    Classification.composited(look, "compare")  # refused before anything is read or written
+    records_of(look, "compare", Classification)  # refused before anything is read or written
     stem, volume = volume_name(options), read_volume(options)
     names = ("angles", "max_supersegments", "precision", "sample_distance", "repeats", "device")
     how = {n: getattr(options, n) for n in names if getattr(options, n) is not None}
@@ -48,7 +49,7 @@ def compare(options: argparse.Namespace) -> int:
 def tradeoff(options: argparse.Namespace) -> int:
     """Measure what each setting costs and gives, and write JSON and tables."""
     look = classification(options)
-    Classification.composited(look, "tradeoff")  # refused before the volume is read
+    records_of(look, "tradeoff", Classification)  # refused before the volume is read
     settings = sweep(dict(map(_axis, options.sweep or DEFAULT_AXES)))
     name, volume = volume_name(options), read_volume(options)
     how = {n: getattr(options, n) for n in ("angles", "repeats", "generations", "device")}

@@ -73,13 +73,12 @@ class Records(AbstractContextManager["Records"]):
             self.thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
             self.counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))
             self._buffers = stack.pop_all()
-        self.defines = {"DOUBLE_FLOAT_RAYS": march.double_float}
         records: dict[str, Any] = {"forms": self.forms, "records": self.runs}
         self._shorten = RayLaunch(
             runtime,
             "generation/shorten_lists.cl",
             "shorten_lists",
-            self.defines,
+            {},
             **records,
             thresholds=self.thresholds,
             errors=self.errors,
@@ -90,14 +89,12 @@ class Records(AbstractContextManager["Records"]):
             self._cut = runtime.bind(
                 "generation/homogeneity.cl",
                 "cut_lists",
-                self.defines,
                 **records,
                 counts=self.counts,
                 recording=self._budget,
             )
-        self._pack = runtime.bind(
-            "generation/pack_lists.cl", "pack_lists", self.defines, **records, capacity=capacity
-        )
+        records |= {"double_float": march.double_float, "capacity": capacity}
+        self._pack = runtime.bind("generation/pack_lists.cl", "pack_lists", **records)
 
     def __exit__(self, *_: object) -> None:
         self._buffers.close()

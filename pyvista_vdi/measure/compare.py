@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pyvista_vdi.io.progress import Pieces
 from pyvista_vdi.measure import bench as measuring
 from pyvista_vdi.measure.bench import Bench, Image, accuracy, take_turns
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import over_background
 from pyvista_vdi.model.standard_cases import ANGLES, WINDOW_SIZE
@@ -71,7 +71,7 @@ def measure(
     the faster of VTK's mappers.
     """
     measuring.check_plan(angles, least=0, repeats=repeats)
-    looks = Classification.composited(classification, "compare")
+    (looks,) = records_of(classification, "compare", Classification)
     done = Pieces(progress, 1 + len(angles))
     table = looks.transfer_function_of(volume)
     more: dict[str, Any] = {"device": device, "vtk": vtk, "sample_distance": sample_distance}
@@ -89,8 +89,13 @@ def measure(
             found |= {"raycaster": bench.reference(camera), "vdi": bench.draw(vdi, camera)}
             pairs = [pair for pair in PAIRS if {*pair} <= {*found}]
             near = {f"{a}_to_{b}": accuracy(found[a], found[b]) for a, b in pairs}
-            seconds = _frame_times(bench, vdi, camera, repeats)
-            theirs = [taken for mapper, taken in seconds.items() if mapper in bench.vtk]
+            # Frames at steps of one voxel, our raycaster's without passing by empty space
+            work = bench.frames(camera, vdi)
+            del work["volume"]
+            work["raycaster"] = partial(bench.raycast, camera, bench.voxel, skip_empty=False)
+            taken = take_turns(work, repeats) if repeats else {}
+            seconds = {name: statistics.median(times) for name, times in taken.items()}
+            theirs = [time for mapper, time in seconds.items() if mapper in bench.vtk]
             over = seconds["vdi"] / min(theirs) if theirs else None
             views.append({"angle": angle, "near": near, "seconds": seconds, "ratio_to_vtk": over})
             images[angle] = found
@@ -122,15 +127,6 @@ def measure(
             "views": views,
         }
     return report, vdi, images
-
-
-def _frame_times(bench: Bench, vdi: VDI, camera: Camera, repeats: int) -> dict[str, float]:
-    """Time frames at steps of one voxel; our raycaster's without passing by empty space."""
-    work = bench.frames(camera, vdi)
-    del work["volume"]
-    work["raycaster"] = partial(bench.raycast, camera, bench.voxel, skip_empty=False)
-    taken = take_turns(work, repeats) if repeats else {}
-    return {name: statistics.median(seconds) for name, seconds in taken.items()}
 
 
 def table(report: Mapping[str, Any]) -> str:

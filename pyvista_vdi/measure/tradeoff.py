@@ -21,6 +21,7 @@ from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDI
 from pyvista_vdi.io import whole_file
 from pyvista_vdi.measure import bench as measuring
 from pyvista_vdi.measure.bench import Bench, Step, ratio, take_turns
+from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.inputs import as_volume
@@ -207,8 +208,8 @@ def measure_tradeoff(
     mappers are timed beside, by default where VTK is installed. ``progress`` is called with the
     finished fraction, 0 to 1, and what is being done.
     """
-    keywords = tuple(measure_tradeoff.__kwdefaults__ or ())
-    looks = Classification.composited(classification, "measure_tradeoff", keywords)
+    others = measure_tradeoff.__kwdefaults__
+    (looks,) = records_of(classification, "measure_tradeoff", Classification, others=others)
     volume = as_volume(volume, looks.scalars, looks.preference)
     size = check_window_size(window_size)
     view = None if camera is None else Camera.from_any(camera)

@@ -30,13 +30,12 @@ from pyvista_vdi.model.options import (
 def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) -> None:
     """Raise TypeError for the first argument whose name is not known, and say what is meant."""
     known = [name for name in known if name not in ("self", "look")]
-    options = declared(*RECORDS)
     for name in given:
         if name in known:
             continue
         elsewhere = (each.elsewhere for each in RECORDS if name in vars(each)["declared"])
         hint = next(filter(None, elsewhere), suggestion(name, known))
-        if "settings" in known and name in options and options[name].setting:
+        if "settings" in known and name in Settings.declared:
             hint = f"pass it by settings=pyvista_vdi.Settings({name}=...)"
         raise TypeError(f"{function}() got an unexpected keyword argument {name!r}: {hint}")
 
@@ -135,7 +134,8 @@ def takes(
             except TypeError as error:
                 raise TypeError(f"{called_by}() {error}") from None
             given |= zip(named, args, strict=False)
-            made = records_of(given, called_by, *records.values(), without=without)
+            taken = {name: given.pop(name) for name in options.keys() & given.keys()}
+            made = records_of(taken, called_by, *records.values(), without=without)
             return function(**given, **dict(zip(records, made, strict=True)))
 
         # The docstring describes options behind the parameters, those apart that it has already
@@ -153,42 +153,35 @@ def takes(
 
 
 def records_of(
-    given: dict[str, Any],
+    given: Mapping[str, Any],
     function: str,
     *records: Any,
     defaults: Mapping[str, Any] | None = None,
     without: Iterable[str] = (),
+    others: Iterable[str] | None = None,
 ) -> list[Any]:
-    """Return records of the options that a function was given, which are taken out of ``given``.
+    """Return records of the options that a function was given; TypeError for what none has.
 
     ``settings``, where they are among it, say some of them, but for those ``without`` which it
-    does; ``defaults`` are others than declared.
+    does; ``defaults`` are others than declared. ``others`` are the function's other arguments,
+    which the error may suggest.
     """
-    settings = given.pop("settings", None)
+    taken = [told for told in declared(*records).values() if told.name not in without]
+    names = [told.name for told in taken if not told.setting]
+    turned = sorted([told.name for told in taken if told.setting])
+    names += ["settings"] * bool(turned)
+    if not given.keys() <= {*names}:
+        refuse_unknown(given, function, (*names, *(others or ())))
+    settings = given.get("settings")
     if not isinstance(settings, Settings | None):
         raise InvalidArgumentTypeError(f"settings must be a pyvista_vdi.Settings; got {settings!r}")
     said = dict(defaults or {})
     if settings is not None:
-        known = [name for name, told in declared(*records).items() if told.setting]
-        known = [name for name in known if name not in without]
-        if vain := [name for name in settings.given if name not in known]:
+        if vain := [name for name in settings.given if name not in turned]:
             raise InvalidArgumentError(
                 f"{', '.join(vain)} of the settings means nothing to {function}, which has "
-                f"{', '.join(sorted(known))}: leave it out"
+                f"{', '.join(turned)}: leave it out"
             )
         said |= settings.said
-    made = []
-    for each in records:
-        found = {}
-        for name, told in each.declared.items():
-            if name in given and not told.setting:
-                found[name] = given.pop(name)
-            elif name in said:
-                found[name] = said[name]
-        made.append(each(**found))
-    return made
-
-
-def names_of(*records: Any) -> list[str]:
-    """Return the arguments that records of options bring, ``settings`` among them."""
-    return [n for n, told in declared(*records).items() if not told.setting] + ["settings"]
+    said |= {name: given[name] for name in names if name in given}
+    return [each(**{n: said[n] for n in each.declared if n in said}) for each in records]

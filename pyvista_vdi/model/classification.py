@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from importlib.util import find_spec
 from typing import Any
@@ -16,9 +15,8 @@ from pyvista_vdi.errors import (
     MissingDependencyError,
     UnsupportedError,
 )
-from pyvista_vdi.model.arguments import refuse_unknown
 from pyvista_vdi.model.checks import Number
-from pyvista_vdi.model.options import Options, declared, option, record
+from pyvista_vdi.model.options import Options, option, record
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import (
     ColorMapLike,
@@ -150,17 +148,6 @@ class Classification(Look, ArrayChoice):
                 "other"
             )
         super().__post_init__()
-
-    @classmethod
-    def composited(
-        cls, given: Mapping[str, Any], function: str, others: Sequence[str] = ()
-    ) -> Classification:
-        """Return the classification of a VDI by arguments that a function was given.
-
-        ``others`` are the function's other keyword arguments, for a TypeError that suggests one.
-        """
-        refuse_unknown(given, function, (*declared(Classification), *others))
-        return cls(**given)
 
     def require_no_look(self) -> None:
         """Refuse a look where values are kept to be classified afterwards."""

@@ -13,7 +13,7 @@ import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any, ClassVar, Literal, TypeAlias, TypeVar, get_args, get_origin
 
 import numpy as np
@@ -131,7 +131,8 @@ def option(
     return field(default=default, metadata={"option": told})
 
 
-def declared(*records: type[Options]) -> dict[str, Option]:
+@cache
+def declared(*records: type[Options]) -> Mapping[str, Option]:
     """Return the options that some records declare, by their names."""
     return {name: told for record in records for name, told in record.declared.items()}
 

@@ -50,7 +50,7 @@ class Costs:
     slope: float | None = None  # of the rise with the angle, over the typical one of CPUs
 
     def took(
-        self, way: RenderMode, angle: float, pixels: float, seconds: float, *, gpu: bool = False
+        self, way: RenderMode, angle: float, pixels: float, seconds: float, *, gpu: bool
     ) -> Costs:
         """Note what a picture's rays have taken, through a VDI so many degrees from its view."""
         if not (pixels >= 1 and seconds > 0):

@@ -152,7 +152,8 @@ def _watched(seen: Seen) -> Plan:
         return _planned(seen, "vdi", update=not seen.failed, give_up=give_up)
     # Make what is missing at rest; give up what no longer serves
     serves = making is not None and not (
-        _other(seen, making.content) or (not seen.hand and _left(seen, making))
+        (seen.content is not None and making.content != seen.content)
+        or (not seen.hand and _left(seen, making))
     )
     asked_for = asked or (seen.chosen and made is not None)
     make = None
@@ -208,10 +209,6 @@ def _follow(seen: Seen) -> bool:
     """Make a VDI of what has changed for this frame's view, if it is a whole picture."""
     follows = seen.one_view and seen.first_look and seen.regenerate != "never"
     return follows and seen.made is not None and seen.stale and not seen.failed
-
-
-def _other(seen: Seen, content: Any) -> bool:
-    return seen.content is not None and bool(content != seen.content)
 
 
 def _left(seen: Seen, making: Making) -> bool:

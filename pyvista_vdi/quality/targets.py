@@ -42,7 +42,7 @@ _FRAMES = 2
 #: Options that are chosen, or left no room for.
 _CHOSEN = ("max_supersegments", "tolerance", "precision")
 #: Bytes on a device in the 8-byte form; a list that is not empty has a header.
-_LIST_BYTES, _SUPERSEGMENT_BYTES, _HEADER_BYTES = 4, 8, 16
+_LIST_BYTES, _SUPERSEGMENT_BYTES, _HEADER_BYTES = 8, 8, 16
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,9 @@ def generate_anywhere(
             view, size = request.camera, request.window_size
             loaded = request.volume.load(view, window_size=size)
             return generate_anywhere(request.replace(volume=loaded), target)
-        return registry.generator("blocks")(request, client)  # type: ignore[no-any-return]
+        return registry.placed("generators", "blocks", missing="generating by blocks")(
+            request, client
+        )  # type: ignore[no-any-return]
     if client is not None:
         raise InvalidArgumentError(
             f"client is for chunked volumes, and {name!r} is in memory: give a Volume of a "

@@ -245,10 +245,7 @@ class StepSampler(AbstractContextManager["StepSampler"]):
         rays: dict[str, Any] = {"forms": forms, "opaque_depth": ends, "visible": bricks.visible}
         rays |= {"bricks": bricks.layout.numbers, "samples": self.samples}
         defines = replace(variant, index="uint").defines  # of a brick's points
-        self._want = runtime.bind(
-            "volume/bricks.cl", "want_bricks", defines, classified=medium["classified"], **rays
-        )
-        self._take = runtime.bind(
+        self._launch = runtime.bind(
             "volume/bricks.cl", "sample_steps", defines, **medium, slots=bricks.slots, **rays
         )
 
@@ -260,10 +257,10 @@ class StepSampler(AbstractContextManager["StepSampler"]):
         """Sample steps of rays, as their numbers (``RaysOfView``) say."""
         items = block_items(view["columns"], view["rows"])
         wanted = self._bricks.wanted(
-            lambda table: self._want(items, GROUP, view=view, wanted=table)
+            lambda table: self._launch(items, GROUP, view=view, wanted=table)
         )
         for _ in self._bricks.rounds(wanted):
-            self._take(items, GROUP, view=view)
+            self._launch(items, GROUP, view=view, wanted=None)
 
 
 def in_parts(

@@ -9,9 +9,7 @@ import pytest
 
 import pyvista_vdi as pvdi
 from pyvista_vdi import api
-from pyvista_vdi.errors import (
-    MissingDependencyError,
-)
+from pyvista_vdi.errors import MissingDependencyError
 from pyvista_vdi.model import classification
 from pyvista_vdi.model.standard_cases import filling_camera
 

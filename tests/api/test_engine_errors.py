@@ -12,11 +12,7 @@ import pytest
 from drawing import generate_vdi, raycast_volume
 
 from pyvista_vdi import Camera, TransferFunction, Volume
-from pyvista_vdi.errors import (
-    Cancelled,
-    DeviceMemoryError,
-    InvalidArgumentError,
-)
+from pyvista_vdi.errors import Cancelled, DeviceMemoryError, InvalidArgumentError
 
 WINDOW = (12, 9)
 CAMERA = Camera((3.5, 3.5, 30), (3.5, 3.5, 3.5), (0, 1, 0))

@@ -9,11 +9,7 @@ import pytest
 from real_data import require_data
 
 from pyvista_vdi import examples
-from pyvista_vdi.errors import (
-    DataNotFoundError,
-    InvalidArgumentError,
-    InvalidVolumeError,
-)
+from pyvista_vdi.errors import DataNotFoundError, InvalidArgumentError, InvalidVolumeError
 
 SHIPPED = sorted(examples.SHIPPED)
 READ_ON_EVERY_CHANGE = ("aneurism", "catphan", "tooth")

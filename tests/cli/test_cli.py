@@ -7,6 +7,7 @@ import re
 import shlex
 import subprocess
 import sys
+import time
 
 import nrrd
 import numpy as np
@@ -19,6 +20,7 @@ import pyvista_vdi as pvdi
 from pyvista_vdi import cli, io, registry
 from pyvista_vdi.cli import parser
 from pyvista_vdi.model.standard_cases import filling_camera
+from pyvista_vdi.plotting import progress
 
 NAMES = """
 devices generate render view info convert serve series set compare tradeoff
@@ -141,6 +143,16 @@ def test_what_ends_the_work_is_one_line(folder, capsys, monkeypatch, error, stat
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="file names of any bytes")
+def test_a_bar_says_how_far_the_work_is(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    bar = progress.DelayedBar(always=True, label="rendering")
+    for fraction in (0.0, 0.25, 0.5):
+        time.sleep(0.15)  # tqdm writes every tenth of a second
+        bar(fraction, "drawing")
+    assert "rendering: drawing:  50%" in capsys.readouterr().err.split("\r")[-1]
+    bar.close()
+
+
 def test_nothing_that_a_file_says_reaches_the_terminal_raw(capsys, tmp_path):
     """Names and text in a file may hold what moves the cursor, or what cannot be written."""
     path = tmp_path / "\udcff.vdi"  # a byte that is no UTF-8

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pyvista_vdi.device import (
-    programs,
-)
+from pyvista_vdi.device import programs
 from pyvista_vdi.errors import DeviceError, InvalidArgumentError
 
 SOURCE = """\

@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 import reference
 from drawing import generate_vdi, raycast_volume, render_vdi, render_vdis
-from extreme_scenes import (
-    BOUND,
-    assert_within,
-    slabs_vdi,
-)
+from extreme_scenes import BOUND, assert_within, slabs_vdi
 from reference.compositing import composite
 
 from pyvista_vdi import Camera, TransferFunction, Volume

@@ -10,24 +10,9 @@ import numpy as np
 import pytest
 import reference
 from drawing import generate_vdi, raycast_volume, render_vdi
-from extreme_scenes import (
-    FIELD,
-    WINDOW,
-    check_scene,
-    field_volume,
-    transfer,
-    turned,
-    view,
-)
+from extreme_scenes import FIELD, WINDOW, check_scene, field_volume, transfer, turned, view
 
-from pyvista_vdi import (
-    InvalidCameraError,
-    Light,
-    Lights,
-    Shading,
-    TransferFunction,
-    Volume,
-)
+from pyvista_vdi import InvalidCameraError, Light, Lights, Shading, TransferFunction, Volume
 
 pytestmark = pytest.mark.extremes
 

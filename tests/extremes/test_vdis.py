@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 import reference
 from drawing import render_vdi
-from extreme_scenes import (
-    assert_within,
-    check_views,
-    slabs_vdi,
-)
+from extreme_scenes import assert_within, check_views, slabs_vdi
 
 from pyvista_vdi import VDI, Camera
 

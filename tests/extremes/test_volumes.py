@@ -8,14 +8,7 @@ import numpy as np
 import pytest
 import reference
 from drawing import generate_vdi, raycast_volume, render_vdi
-from extreme_scenes import (
-    BOUND,
-    WINDOW,
-    assert_within,
-    check_views,
-    transfer,
-    view,
-)
+from extreme_scenes import BOUND, WINDOW, assert_within, check_views, transfer, view
 
 from pyvista_vdi import Camera, DeviceMemoryError, TransferFunction, Volume
 

@@ -141,6 +141,13 @@ def test_options_are_checked_before_anything_is_written(name, options, message, 
     assert names_in(tmp_path) == []
 
 
+@pytest.mark.parametrize("value", [np.nan, {1: {2}}])
+def test_metadata_that_json_cannot_hold(value, tmp_path):
+    with pytest.raises(VDIFileError, match="metadata cannot be written"):
+        large_vdi((4, 4), metadata={"entry": value}).save(tmp_path / "a.vdi")
+    assert names_in(tmp_path) == []
+
+
 def archive_with(text):
     stream = BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:

@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from pyvista_vdi.model.metrics import (
-    compare_images,
-)
+from pyvista_vdi.model.metrics import compare_images
+from pyvista_vdi.model.standard_cases import filling_camera
 
 
 def picture(seed=0, size=(24, 32), channels=3):
@@ -43,3 +42,23 @@ def test_ssim_is_that_of_wang_et_al():
         (mean_a**2 + mean_b**2 + c1) * (var_a + var_b + c2)
     )
     assert compare_images(a, b).ssim == pytest.approx(ssim[5:-5, 5:-5].mean(), abs=1e-9)
+
+
+def test_a_box_just_fills_the_standard_view():
+    camera = filling_camera(
+        (0, 2, 1, 4, -1, 5), (160, 90), azimuth=30, elevation=-40, view_angle=50
+    )
+    corners = np.array(np.meshgrid((0, 2), (1, 4), (-1, 5), 1)).reshape(4, -1)
+    x, y, z = camera.view_matrix[:3] @ corners
+    t_x, t_y = camera.half_extent((160, 90))
+    reach = max(np.abs(x / (z * t_x)).max(), np.abs(y / (z * t_y)).max())
+    assert z.min() > 0
+    assert reach == pytest.approx(1 - 1e-4, abs=1e-6)  # but for the margin
+    assert camera.focal_point == (1, 2.5, 2)
+    towards = np.subtract(camera.position, camera.focal_point) / math.dist(
+        camera.position, (1, 2.5, 2)
+    )
+    turn, lift = math.radians(30), math.radians(-40)
+    assert towards == pytest.approx(
+        [math.sin(turn) * math.cos(lift), -math.cos(turn) * math.cos(lift), math.sin(lift)]
+    )

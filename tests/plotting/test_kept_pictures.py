@@ -133,3 +133,15 @@ def test_a_picture_at_a_scale_has_the_detail_of_its_pixels(plotter):
         contrast.append(blocks.std(axis=(1, 3)).mean())
     assert contrast[0] == pytest.approx(contrast[1], rel=0.1)
     assert contrast[2] < contrast[1] / 2  # what lists can show of it
+
+
+def test_a_volume_in_bricks_has_its_picture(plotter):
+    actor = plotter.add_vdi(soft_ball(80), settings=pvdi.Settings(memory_limit=12_000_000), **LOOKS)
+    plotter.camera_position = VIEW
+    picture = shown(plotter)
+    assert actor.status.drawn == "volume"
+    other = pv.Plotter(window_size=plotter.window_size)
+    other.add_vdi(soft_ball(80), draw="volume", **LOOKS)
+    other.camera_position = VIEW
+    np.testing.assert_allclose(picture, shown(other), atol=1)
+    other.close()

@@ -9,13 +9,7 @@ import strategies
 from drawing import generate_vdi, raycast_volume, render_vdi
 from runtimes import let_lack
 
-from pyvista_vdi import (
-    AmbientOcclusion,
-    DeviceMemoryError,
-    Shading,
-    TransferFunction,
-    Volume,
-)
+from pyvista_vdi import AmbientOcclusion, DeviceMemoryError, Shading, TransferFunction, Volume
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 

@@ -10,11 +10,7 @@ import pyvista as pv
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from pyvista_vdi.errors import (
-    InvalidArgumentError,
-    UnsupportedError,
-    VDIWarning,
-)
+from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIWarning
 from pyvista_vdi.model.lighting import Lights, Shading
 from pyvista_vdi.vtk_pipeline.filters.convert import volume_from_vtk
 from pyvista_vdi.vtk_pipeline.filters.properties import transfer_function_from_property

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pipelines import (
-    Maker,
-    Scene,
-    array_of,
-    assert_same,
-    image_of,
-    is_blank,
-    values,
-)
+from pipelines import Maker, Scene, array_of, assert_same, image_of, is_blank, values
 
 from pyvista_vdi.errors import VDIWarning
 from pyvista_vdi.vtk_pipeline.vtk import (

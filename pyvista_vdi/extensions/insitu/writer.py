@@ -25,7 +25,7 @@ from pyvista_vdi.extensions.large.on_mpi import (
 from pyvista_vdi.extensions.series.series import checked_time
 from pyvista_vdi.extensions.series.writer import SeriesWriter
 from pyvista_vdi.generation.deferred import generate_deferred, unclassified
-from pyvista_vdi.model.arguments import names_of, records_of
+from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import Number, as_vector
 from pyvista_vdi.model.classification import Classification
@@ -35,7 +35,7 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import CameraLike, DeviceLike, WindowSize
 from pyvista_vdi.model.volume import Grid, Volume
 
-_RECORDS = (Deferral, GenerationOptions)
+_RECORDS = (Classification, Deferral, GenerationOptions)
 
 
 class InSitu:
@@ -152,10 +152,10 @@ class InSitu:
 
     def _check(self, looks: dict[str, Any]) -> None:
         """Take what generate takes, or raise."""
-        self._deferral, self._options = records_of(
+        self._looks, self._deferral, self._options = records_of(
             looks, "InSitu", *_RECORDS, defaults={"precision": "8-byte"}
         )
-        missing = looks.get("clim") is None and "transfer_function" not in looks
+        missing = self._looks.clim is None and self._looks.transfer_function is None
         if self._deferral.deferred:
             missing = self._deferral.value_range is None
         if missing:
@@ -163,7 +163,6 @@ class InSitu:
                 f"{'value_range' if self._deferral.deferred else 'clim'}=(low, high) is missing: "
                 "no step knows the range of the others"
             )
-        self._looks = Classification.composited(looks, "InSitu", names_of(*_RECORDS))
         if self._deferral.deferred:
             self._looks.require_no_look()
             self._function = unclassified(self._looks.interpolation)

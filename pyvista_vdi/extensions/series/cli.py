@@ -28,6 +28,7 @@ from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.series import Called, VDISeries, check_range
 from pyvista_vdi.io import read, read_info
 from pyvista_vdi.io.files import holds
+from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.checks import as_number
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
@@ -65,7 +66,7 @@ def series(options: argparse.Namespace) -> int:
     times = _times(steps) if options.times is None else options.times
     vdis = VDISeries(Called(vdi_of, range(len(steps))), times)
     look = classification(options)
-    Classification.composited(look, "series")
+    records_of(look, "series", Classification)
     how = look | given(options, GenerationOptions, Deferral)
     check_writable(with_suffix(Path(options.output), (".vdis",), "a series"))
     with closing(DelayedBar(label="writing a series")) as bar:

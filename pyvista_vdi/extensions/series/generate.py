@@ -17,7 +17,7 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_times
 from pyvista_vdi.io.progress import Pieces
 from pyvista_vdi.io.stores import StoredVolume
-from pyvista_vdi.model.arguments import names_of, records_of
+from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.classification import IN_PLACE, Classification
 from pyvista_vdi.model.inputs import as_volume
@@ -25,9 +25,6 @@ from pyvista_vdi.model.options import Deferral, GenerationOptions
 from pyvista_vdi.model.types import CameraLike, ClientLike, DeviceLike, Progress, WindowSize
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.volume import Volume
-
-_RECORDS = (Deferral, GenerationOptions)
-_OTHERS = names_of(*_RECORDS)
 
 
 def generate_series(
@@ -117,10 +114,9 @@ class StepMaker:
     ) -> None:
         self._camera, self._size = Camera.from_any(camera), check_window_size(window_size)
         self._where = {name: options.pop(name, None) for name in ("client", "device")}
-        looks = {n: v for n, v in options.items() if n not in _OTHERS}
-        self._looks = Classification.composited(looks, function, _OTHERS)
+        records = Classification, Deferral, GenerationOptions
+        self._looks, deferral, _ = records_of(options, function, *records)
         self._described = self._looks.describe()
-        deferral, _ = records_of(dict(options), function, *_RECORDS)
         if deferral.deferred:
             self._looks.require_no_look()
         options.setdefault("precision", "8-byte")
@@ -136,7 +132,7 @@ class StepMaker:
             # A colour stands for the same value in all steps
             table = self._looks.transfer_function_of(volume)
             self._looks = Classification(transfer_function=table)
-            kept = {n: v for n, v in self._options.items() if n in _OTHERS}
+            kept = {n: v for n, v in self._options.items() if n not in Classification.declared}
             self._options = {**kept, "transfer_function": table}
         vdi: Any = generate(volume, self._camera, self._size, **self._where, **self._options)
         vdi.metadata["classification"] = self._described  # as the first step's was asked for

@@ -12,7 +12,7 @@ from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.io.progress import Pieces
-from pyvista_vdi.model.arguments import names_of, records_of
+from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_whole
 from pyvista_vdi.model.classification import Classification
@@ -23,8 +23,6 @@ from pyvista_vdi.model.types import CameraLike, DeviceLike, Progress, VolumeLike
 from pyvista_vdi.model.view import bounds_corners, covering_view
 from pyvista_vdi.quality.view_error import world_centre
 
-#: Half angle of the cone that a V_O of a set has to serve, degrees: others serve what is beyond.
-VIEW_CONE = 30.0
 #: Above this share of the length along the axis of a view's up direction another one is up.
 _TOO_STEEP = 0.98
 
@@ -99,9 +97,10 @@ def generate_set(
         raise InvalidArgumentError(f"half_angle must be degrees, 0 to 180; got {half_angle!r}")
     if not 0.05 <= as_float(lists) <= 8:
         raise InvalidArgumentError(f"lists must be 0.05 to 8 per pixel; got {lists!r}")
-    standard = {"precision": "8-byte", "view_cone": VIEW_CONE}
-    (made,) = records_of(options, "generate_set", GenerationOptions, defaults=standard)
-    looks = Classification.composited(options, "generate_set", names_of(GenerationOptions))
+    # Other V_O serve what is beyond the cone
+    standard = {"precision": "8-byte", "view_cone": 30.0}
+    records = GenerationOptions, Classification
+    made, looks = records_of(options, "generate_set", *records, defaults=standard)
     read = as_volume(volume, looks.scalars, looks.preference)
     if not isinstance(views, int | str) and np.iterable(views):
         if camera is not None or half_angle != 180:

@@ -10,7 +10,6 @@ from pyvista_vdi.cli.inputs import classification, given, read_volume
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.errors import naming
 from pyvista_vdi.extensions.series.series import Called
-from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 
 
@@ -27,7 +26,6 @@ def serve(options: argparse.Namespace) -> int:
             return step.read()
 
     arguments = classification(options)
-    Classification.composited(arguments, "serve")  # refused before the volume is read
     serve_volumes(
         Called(volume_of, steps),  # read when somebody wants to see it
         host=options.host,

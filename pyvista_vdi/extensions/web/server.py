@@ -23,6 +23,7 @@ from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.page import html_page
 from pyvista_vdi.extensions.web.source import BadMessageError, Source, Wish, wish_after
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion
+from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.types import DeviceLike, OcclusionLike, VolumeLike
@@ -342,7 +343,7 @@ def serve(
     MissingDependencyError
         If aiohttp is not installed.
     """
-    looks = Classification.composited(classification, "serve", [*(serve.__kwdefaults__ or ())])
+    (looks,) = records_of(classification, "serve", Classification, others=serve.__kwdefaults__)
     options = GenerationOptions(
         max_supersegments=max_supersegments,
         sample_distance=sample_distance,

@@ -98,24 +98,15 @@ class Layout:
         }
 
 
-def layouts(
-    window_size: tuple[int, int],
-    n: int,
-    counts: np.dtype[Any],
-    *,
-    filtered: bool,
-    version: int = FORMAT_VERSION,
-    precision: str = "exact",
-) -> dict[str, Layout]:
+def layouts(vdi: Any, counts: np.dtype[Any], *, filtered: bool, version: int) -> dict[str, Layout]:
     """Return the arrays of a file, in their order.
 
-    ``n``: supersegments in all lists. ``counts``: type of the lists' lengths, as small as they
-    allow. ``filtered``: whether exact depths are stored as differences. ``precision``: one of
-    :data:`pyvista_vdi.model.packing.PRECISIONS`; packed since version 3.
+    ``vdi``: a VDI, or what a file says of it. ``counts``: type of the lists' lengths, as small as
+    they allow. ``filtered``: whether exact depths are stored as differences.
     """
-    n_lists = window_size[0] * window_size[1]
+    n_lists, n = vdi.window_size[0] * vdi.window_size[1], vdi.n_supersegments
     arrays: dict[str, tuple[Any, tuple[int, ...], int, str]]
-    if precision == "8-byte":
+    if vdi.precision == "8-byte":  # since version 3
         color_filter = "none" if version < 4 else "channel-difference"
         arrays = {
             "counts": (counts, (), n_lists, "none"),

@@ -292,14 +292,8 @@ class _OpenFile:
             self._refuse("it does not describe its arrays")
         if counts.str not in ("|u1", "<u2", "<u4", "<u8"):
             self._refuse(f"counts of type {counts} are unknown")
-        wanted = layouts(
-            info.window_size,
-            info.n_supersegments,
-            counts,
-            filtered=info.codec != "none",
-            version=info.format_version,
-            precision=info.precision,
-        )
+        filtered, version = info.codec != "none", info.format_version
+        wanted = layouts(info, counts, filtered=filtered, version=version)
         for name, layout in wanted.items():
             if arrays.get(name) != layout.to_dict():
                 self._refuse(

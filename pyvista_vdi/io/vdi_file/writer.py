@@ -85,14 +85,8 @@ def write_to(
     counts = vdi.counts.ravel().astype(kind)
     version = FORMAT_VERSION if compression == DEFLATE else VERSION_OF[vdi.precision]
     packing = vdi.packing
-    arrays = layouts(
-        vdi.window_size,
-        vdi.n_supersegments,
-        counts.dtype,
-        filtered=compression != "none",
-        version=version,
-        precision=vdi.precision,
-    )
+    filtered = compression != "none"
+    arrays = layouts(vdi, counts.dtype, filtered=filtered, version=version)
     # Describe them
     entries = describe(shown, version)
     if about is not None:

@@ -226,9 +226,10 @@ class Driver:
         self._spare = self._last.pixels
         window.pace.drawn(sized.size, sized.full_size, seconds, sized.way, sized.effort)
         # A volume's first picture has kernels compiled and voxels sent to the device
+        gpu = not get_runtime(self.device).is_cpu
         if sized.volume is None or sized.volume.pictures > 1:
             of = (sized.way, sized.angle, sized.covered_by(sized.bounds), seconds)
-            self.costs = self.costs.took(*of, gpu=not get_runtime(self.device).is_cpu)
+            self.costs = self.costs.took(*of, gpu=gpu)
         elif self.seen is not None and self.costs.volume is None:
             coarse, taken = frame.coarser(reduced(frame.full_size, FLOOR)), []
             for _ in range(_TRIALS):
@@ -236,7 +237,7 @@ class Driver:
                 raycast(coarse, self.device, None)
                 taken.append(now() - began)
             pixels = coarse.covered_by(coarse.bounds)
-            self.costs = self.costs.took("volume", 0.0, pixels, min(taken))
+            self.costs = self.costs.took("volume", 0.0, pixels, min(taken), gpu=gpu)
         return drawn
 
     def _seen_in(self, frame: Frame) -> Frame | None:

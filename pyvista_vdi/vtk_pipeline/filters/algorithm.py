@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -155,7 +155,7 @@ class SceneAlgorithm(Algorithm):
     _, GetCamera = accessors("camera", "the view, as it was set; ``None`` where none was")
 
     _property: HeldByVTK | None = None
-    _observed: tuple[tuple[HeldByVTK, int], ...] = ()
+    _observed: Sequence[tuple[HeldByVTK, int]] = ()
 
     def SetCamera(
         self, camera: CameraLike | None, model_transform: ArrayLike | None = None
@@ -201,7 +201,7 @@ class SceneAlgorithm(Algorithm):
         """Modify this algorithm whenever the property or one of its functions is modified."""
         for watched, tag in self._observed:
             watched.get().RemoveObserver(tag)
-        self._observed, prop = (), self.GetVolumeProperty()
+        self._observed, prop = [], self.GetVolumeProperty()
         if prop is None:
             return
         there = [prop, color_function(prop), prop.GetScalarOpacity()]
@@ -212,7 +212,7 @@ class SceneAlgorithm(Algorithm):
             algorithm._observe_property()  # its functions may be others now
             algorithm.Modified()
 
-        self._observed = tuple((HeldByVTK(each), watch(each, self, changed)) for each in there)
+        self._observed = [(HeldByVTK(each), watch(each, self, changed)) for each in there]
 
 
 def watch(

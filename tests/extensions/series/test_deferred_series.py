@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import (
-    InvalidVDIError,
-)
+from pyvista_vdi.errors import InvalidVDIError
 
 pytestmark = pytest.mark.filterwarnings("ignore:the transfer function shows values outside")
 

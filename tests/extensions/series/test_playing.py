@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from plugin_scenes import CLASSIFICATION, soft_ball
-from watched_windows import (
-    WINDOW,
-    frame,
-    picture_of,
-    threads,
-)
+from watched_windows import WINDOW, frame, picture_of, threads
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import VDIWarning

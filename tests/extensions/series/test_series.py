@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 
 import pyvista_vdi as pvdi
-from pyvista_vdi.errors import (
-    Cancelled,
-    InvalidArgumentError,
-    InvalidVDIError,
-    InvalidVolumeError,
-)
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError, InvalidVDIError, InvalidVolumeError
 from pyvista_vdi.model.standard_cases import filling_camera
 
 SIZE = (20, 12)

@@ -43,7 +43,7 @@ HELD = 1 << 14
 
 def source_of(*volumes, lists=1280 * 720, **look):
     options = GenerationOptions(max_supersegments=8, precision="8-byte")
-    return Source(volumes, Classification.composited(look, "serve"), options, lists=lists)
+    return Source(volumes, Classification(**look), options, lists=lists)
 
 
 @pytest.fixture(scope="module")
