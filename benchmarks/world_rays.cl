@@ -4,7 +4,6 @@
 // j <= V < j + 1; Z less the depth origin; and d, which is Z, or 1 in parallel projection.
 //
 // -D BINARY_SEARCH  a list's first supersegment by halving, not by looking from its beginning
-#define DEPTH RECIPROCAL // of no coordinate here
 #include "lib/list_space.cl"
 #include "lib/compositing.cl"
 #pragma OPENCL FP_CONTRACT OFF

@@ -86,7 +86,6 @@ __kernel void cut_lists(const RaysOfView view, __global const float *forms,
     const float per_reference = march_speed(forms, ray.a, ray.b) / recording.reference_length;
     __global float *record = records + record_start(item, recording.capacity);
     const int cut = cut_to_limit(record, (int)counts[list], recording.limit, per_reference);
-    const Places starts = {0};
-    counts[list] = (uint)merge_within(record, &starts, cut, recording.finest, true, per_reference,
+    counts[list] = (uint)merge_within(record, 0, cut, recording.finest, true, per_reference,
                                       recording.hidden_weight);
 }

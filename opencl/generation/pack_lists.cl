@@ -1,14 +1,13 @@
 // Pack: records to the VDI's arrays.
-//
-// -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
 #include "volume/rays_of_view.cl"
 #include "generation/records.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
 // Records of a slice of rays to the VDI's arrays.
 __kernel void
-pack_lists(const RaysOfView view, // the slice
-           __global const float *forms, int capacity, __global const float *records,
+pack_lists(const RaysOfView view,                         // the slice
+           __global const float *forms, int double_float, // whether t counts from the entry
+           int capacity, __global const float *records,
            __global const ulong *offsets, // where each list begins, and the last one ends
            uint made,                     // lists before the slice's
            ulong held,                    // supersegments before those that the arrays hold
@@ -27,7 +26,7 @@ pack_lists(const RaysOfView view, // the slice
     const int count = (int)(offsets[list + 1] - offsets[list]);
     float2 entry = (float2)(0.0f);
     float least = -INFINITY, most = INFINITY;
-    if (DOUBLE_FLOAT_RAYS) {
+    if (double_float) {
         float length = 0.0f;
         clip_from_entry(forms + 6 * FORM_SIZE, view.planes, ray.a, ray.b, INFINITY, &entry,
                         &length);
@@ -39,7 +38,7 @@ pack_lists(const RaysOfView view, // the slice
     }
     for (int k = 0; k < count; ++k) {
         Run run = load_run(record, k);
-        if (DOUBLE_FLOAT_RAYS) {
+        if (double_float) {
             // Rounding must neither leave a supersegment without thickness nor let two overlap
             run.FRONT = fmax(double_float_sum(entry, (float2)(run.FRONT, 0.0f)).x, least);
             run.BACK = fmin(double_float_sum(entry, (float2)(run.BACK, 0.0f)).x, most);

@@ -5,8 +5,6 @@
 // Of sixteen rays each merge would wait for the divisions of the one before, and for branches that
 // no processor foresees: all take the same steps, and what depends on the ray is selected. `starts`
 // says where the words of each ray's runs begin, from `records` on.
-//
-// -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
 #include "volume/rays_of_view.cl"
 #include "generation/merging.cl"
 #pragma OPENCL FP_CONTRACT OFF
@@ -23,14 +21,13 @@ inline size_t errors_start(uint ray, int capacity)
 }
 
 // Errors of k: what merging runs k and k + 1 costs; INFINITY where there are no two.
-inline void measure_errors(__global const float *records, const Places *starts,
-                           __global float *errors, Int counts, int most, Real per_reference,
-                           float hidden_weight)
+inline void measure_errors(__global const float *records, Int starts, __global float *errors,
+                           Int counts, int most, Real per_reference, float hidden_weight)
 {
-    Run run = load_run_at(records, starts->all);
+    Run run = load_run_at(records, starts);
     Real4 feature = run_feature(run, per_reference);
     for (int k = 0; k < most - 1; ++k) {
-        const Run next = load_run_at(records + min(k + 1, most - 1) * RUN_WORDS, starts->all);
+        const Run next = load_run_at(records + min(k + 1, most - 1) * RUN_WORDS, starts);
         const Real4 next_feature = run_feature(next, per_reference);
         const Int there = k + 1 < counts;
         const Real error =
@@ -39,15 +36,6 @@ inline void measure_errors(__global const float *records, const Places *starts,
         run = next;
         feature = next_feature;
     }
-}
-
-// How many errors are within thresholds.
-inline Int count_within(__global const float *errors, int most, Real thresholds)
-{
-    Int within = 0;
-    for (int k = 0; k < most - 1; ++k)
-        within += COUNT(LOAD_LANES(0, ERRORS(k)) <= thresholds);
-    return within;
 }
 
 // The pair of the least error; of equals the first.
@@ -66,16 +54,16 @@ inline Int least_error(__global const float *errors, int most)
 
 // Merge neighbours whose error is within thresholds, in one pass from front to back, for rays that
 // are chosen. Returns how many runs each ray has then.
-inline Int merge_within(__global float *records, const Places *starts, Int counts, Real thresholds,
+inline Int merge_within(__global float *records, Int starts, Int counts, Real thresholds,
                         Int chosen, Real per_reference, float hidden_weight)
 {
     const int most = largest_lane(counts);
-    Run run = load_run_at(records, starts->all);
+    Run run = load_run_at(records, starts);
     Real4 feature = run_feature(run, per_reference);
     Int kept = 0;
-    Int place = starts->all;
+    Int place = starts;
     for (int k = 1; k < most; ++k) {
-        const Run next = load_run_at(records + k * RUN_WORDS, starts->all);
+        const Run next = load_run_at(records + k * RUN_WORDS, starts);
         const Real4 next_feature = run_feature(next, per_reference);
         const Int there = chosen & (k < counts);
         const Real error =
@@ -96,9 +84,8 @@ inline Int merge_within(__global float *records, const Places *starts, Int count
 }
 
 // Raise thresholds and merge within them until at most `limit` runs of each ray are left.
-inline Int make_room(__global float *records, const Places *starts, __global float *errors,
-                     Int counts, int limit, Real *thresholds, Real per_reference,
-                     float hidden_weight)
+inline Int make_room(__global float *records, Int starts, __global float *errors, Int counts,
+                     int limit, Real *thresholds, Real per_reference, float hidden_weight)
 {
     for (;;) {
         const Int chosen = counts > limit;
@@ -107,7 +94,10 @@ inline Int make_room(__global float *records, const Places *starts, __global flo
         const int most = largest_lane(counts);
         measure_errors(records, starts, errors, counts, most, per_reference, hidden_weight);
         for (;;) {
-            const Int low = chosen & (count_within(errors, most, *thresholds) < counts - limit);
+            Int within = 0;
+            for (int k = 0; k < most - 1; ++k)
+                within += COUNT(LOAD_LANES(0, ERRORS(k)) <= *thresholds);
+            const Int low = chosen & (within < counts - limit);
             if (!ANY(low))
                 break;
             *thresholds = SELECT(*thresholds, *thresholds * 4.0f, low);
@@ -154,13 +144,12 @@ inline Run run_of(__global const float *records, Int starts, Int k)
 }
 
 // Merge, least error first, until at most `limit` runs of each ray are left.
-inline Int merge_to_limit(__global float *records, const Places *first, __global float *errors,
-                          Int counts, int limit, Real per_reference, float hidden_weight)
+inline Int merge_to_limit(__global float *records, Int starts, __global float *errors, Int counts,
+                          int limit, Real per_reference, float hidden_weight)
 {
     const int most = largest_lane(counts);
-    const Places many = {counts};
-    measure_errors(records, first, errors, counts, most, per_reference, hidden_weight);
-    const Int starts = first->all;
+    const Places many = {counts}, first = {starts};
+    measure_errors(records, starts, errors, counts, most, per_reference, hidden_weight);
     Int alive = counts;
     const Int within = max(counts, 2); // so that every lane has somewhere to look
     for (;;) {
@@ -193,7 +182,7 @@ inline Int merge_to_limit(__global float *records, const Places *first, __global
         for (int lane = 0; lane < LANES; ++lane) {
             if (!who.each[lane])
                 continue;
-            __global float *record = records + first->each[lane];
+            __global float *record = records + first.each[lane];
             record[taken.each[lane] * RUN_WORDS + TAU_WORD] = -1.0f;
             record[(taking.each[lane] + 1) * RUN_WORDS + NEXT_WORD] = as_float(last.each[lane]);
             record[(last.each[lane] - 1) * RUN_WORDS + BEFORE_WORD] = as_float(taking.each[lane]);
@@ -208,7 +197,7 @@ inline Int merge_to_limit(__global float *records, const Places *first, __global
     for (int lane = 0; lane < LANES; ++lane) {
         if (many.each[lane] <= limit)
             continue;
-        __global ulong4 *record = (__global ulong4 *)(records + first->each[lane]);
+        __global ulong4 *record = (__global ulong4 *)(records + first.each[lane]);
         int from = 1;
         for (int to = 1; to < limit; ++to) {
             __global const float *words = (__global const float *)(record + from);
@@ -239,13 +228,13 @@ KERNEL_OF_LANES void shorten_lists(const RaysOfView view, __global const float *
     const Real per_reference = march_speed(forms, rays.a, rays.b) / recording.reference_length;
     records += record_start(first, recording.capacity);
     errors += errors_start(first, recording.capacity);
-    const Places starts = {LANE_NUMBERS * (recording.capacity * RUN_WORDS)};
+    const Int starts = LANE_NUMBERS * (recording.capacity * RUN_WORDS);
     if (exactly) {
-        runs = merge_to_limit(records, &starts, errors, runs, limit, per_reference,
+        runs = merge_to_limit(records, starts, errors, runs, limit, per_reference,
                               recording.hidden_weight);
     } else {
         Real raised = LOAD_LANES(0, thresholds + first);
-        runs = make_room(records, &starts, errors, runs, limit, &raised, per_reference,
+        runs = make_room(records, starts, errors, runs, limit, &raised, per_reference,
                          recording.hidden_weight);
         STORE_LANES(raised, 0, thresholds + first);
     }

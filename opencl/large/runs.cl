@@ -1,7 +1,5 @@
 // Runs of blocks: from the records of a block's rays, and behind each other into the records of
 // V_O's rays.
-//
-// -D DOUBLE_FLOAT_RAYS: see lib/rays.cl
 #include "volume/rays_of_view.cl"
 #include "generation/merging.cl"
 #pragma OPENCL FP_CONTRACT OFF

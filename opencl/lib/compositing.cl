@@ -45,10 +45,11 @@ inline Sum sum_of(Real value, Real rounded_up, Real summand)
     return sum;
 }
 
-// Composite straight `color` (xyz) behind what has been seen; `weight` is its opacity times the
-// transmittance before it.
-inline void composite_over(Seen *seen, Real weight, Real4 color)
+// Composite a medium of straight colour (xyz) behind what has been seen, for the rays that are
+// chosen.
+inline void composite_medium(Seen *seen, Real optical_depth, Real4 color, Int chosen)
 {
+    const Real weight = SELECT((Real)(0.0f), seen->sums.w * opacity_of(optical_depth), chosen);
     const Sum red = sum_of(seen->sums.x, seen->compensation.x, weight * color.x);
     const Sum green = sum_of(seen->sums.y, seen->compensation.y, weight * color.y);
     const Sum blue = sum_of(seen->sums.z, seen->compensation.z, weight * color.z);
@@ -68,25 +69,14 @@ inline void composite_over(Seen *seen, Real weight, Real4 color)
     }
 }
 
-// Composite a medium of straight colour for the rays that are chosen.
-inline void composite_medium(Seen *seen, Real optical_depth, Real4 color, Int chosen)
-{
-    const Real weight = seen->sums.w * opacity_of(optical_depth);
-    composite_over(seen, SELECT((Real)(0.0f), weight, chosen), color);
-}
-
-inline Real alpha_seen(const Seen *seen)
-{
-    if (COMPENSATED == 1)
-        return fmin(seen->compensation.w, 1.0f);
-    const Real alpha = 1.0f - seen->sums.w;
-    return COMPENSATED == 2 ? alpha + seen->compensation.w : alpha;
-}
-
 // Premultiplied RGBA of what was composited.
 inline Real4 composited(const Seen *seen)
 {
     Real4 rgba = seen->sums;
-    rgba.w = alpha_seen(seen);
+    rgba.w = 1.0f - seen->sums.w;
+    if (COMPENSATED == 1)
+        rgba.w = fmin(seen->compensation.w, 1.0f);
+    if (COMPENSATED == 2)
+        rgba.w += seen->compensation.w;
     return rgba;
 }

@@ -36,7 +36,6 @@ typedef struct {
 #define SELECT(otherwise, then, condition) select(otherwise, then, condition)
 #define ANY(condition)                                                                             \
     any((condition) < 0) // by the sign, which compilers know how to ask a mask for
-#define ALL(condition) all((condition) < 0)
 #define COUNT(condition) (-(condition))
 #define TO_REAL(x) convert_float16(x)
 #define TO_INT(x) convert_int16(x)
@@ -94,8 +93,7 @@ typedef float4 Real4;
 #define REAL3(x, y, z) (float3)(x, y, z)
 #define REAL4(x, y, z, w) (float4)(x, y, z, w)
 #define SELECT(otherwise, then, condition) ((condition) ? (then) : (otherwise))
-#define ANY(condition) (condition) // whether it holds in any lane
-#define ALL(condition) (condition)
+#define ANY(condition) (condition)   // whether it holds in any lane
 #define COUNT(condition) (condition) // 1 where it holds, or 0
 #define TO_REAL(x) ((float)(x))      // the value
 #define TO_INT(x) ((int)(x))

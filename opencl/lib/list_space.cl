@@ -1,23 +1,22 @@
 // V_O's list space, in which lists and supersegments are axis-aligned boxes and rays stay straight
 // (docs/dev/conventions.md, "List coordinates").
 //
-// u and v are pixels of V_O's window from its centre. The depth coordinate z grows with depth:
+// u and v are pixels of V_O's window from its centre. The depth coordinate z grows with depth, and
+// is of one of these kinds:
 //
-//     -D DEPTH=RECIPROCAL   z = -1 / Z            as many digits at every depth
-//     -D DEPTH=SHIFTED      z = (Z - Z_ref) / Z   long lens: what cancels in Z - Z_ref was taken
-//                                                 out in float64 by the host
-//     -D DEPTH=PARALLEL     z = Z - Z_ref         1 / Z is not needed
+//     RECIPROCAL   z = -1 / Z            as many digits at every depth
+//     SHIFTED      z = (Z - Z_ref) / Z   long lens: what cancels in Z - Z_ref was taken out in
+//                                        float64 by the host
+//     PARALLEL     z = Z - Z_ref         parallel projection: in place of 1 / Z stands 1
 //
 // with Z view depth from V_O in world units and Z_ref the VDI's depth origin. An "offset" is
 // Z - Z_ref.
 //
-// -D DOUBLE_FLOAT_RAYS=1, 2   lists hold so little of the depth that float32 has too few digits
-//     for all of it: z is relative to Z_deep, where a ray is deepest (2: least deep), 1 / Z_deep -
-//     1 / Z, or Z - Z_deep if PARALLEL. Faces are kept as offsets (docs/dev/numerics.md).
+// -D DOUBLE_FLOAT_RAYS=1   lists hold so little of the depth that float32 has too few digits for
+//     all of it: z is relative to Z_deep, where a ray is deepest, or least deep (Frame), 1 / Z_deep
+//     - 1 / Z, or Z - Z_deep if PARALLEL. Faces are kept as offsets (docs/dev/numerics.md).
 #include "lib/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
-
-enum { RECIPROCAL, SHIFTED, PARALLEL };
 
 #define U_FORM 0
 #define V_FORM 1
@@ -25,50 +24,63 @@ enum { RECIPROCAL, SHIFTED, PARALLEL };
 #define DENOMINATOR_FORM 3
 #define MODEL_FORM 4
 
-// What depths are relative to; the depth coordinate of an offset, its offset, and 1 / Z there; and
-// what is kept of a face.
+// What depths are relative to; the depth coordinate of an offset, its offset, and 1 / Z there.
 #ifdef DOUBLE_FLOAT_RAYS
 #define FACES_ARE_OFFSETS 1
-#define KEPT_FACE(offset, depth_origin) (offset)
 
 typedef struct {
+    int kind;
+    float origin;
     float2 deep;      // the offset of Z_deep, a pair of lib/double_float.cl
     float reciprocal; // 1 / Z_deep
-    float depth_origin;
 } Depths;
 
 inline float depth_coordinate(float offset, Depths depths)
 {
     const float beyond = (offset - depths.deep.x) - depths.deep.y;
-    if (DEPTH == PARALLEL)
-        return beyond;
-    return beyond * depths.reciprocal / (offset + depths.depth_origin);
+    return beyond * depths.reciprocal / (depths.kind == PARALLEL ? 1.0f : offset + depths.origin);
 }
 
 inline float depth_offset(float z, Depths depths)
 {
-    if (DEPTH == PARALLEL)
+    if (depths.kind == PARALLEL)
         return depths.deep.x + z;
     return depths.deep.x + z / (depths.reciprocal * (depths.reciprocal - z));
 }
 
-inline float reciprocal_depth(float z, Depths depths) { return depths.reciprocal - z; }
+inline float reciprocal_depth(float z, Depths depths)
+{
+    return depths.kind == PARALLEL ? 1.0f : depths.reciprocal - z;
+}
 #else
 #define FACES_ARE_OFFSETS 0
-#define KEPT_FACE(offset, depth_origin) depth_coordinate(offset, depth_origin)
 
-typedef float Depths; // the depth origin
+typedef struct {
+    int kind;
+    float origin; // the depth origin
+} Depths;
 
 // Of one number or of a vector of them
-#define depth_coordinate(offset, depth_origin)                                                     \
-    (DEPTH == PARALLEL  ? (offset)                                                                 \
-     : DEPTH == SHIFTED ? (offset) / ((offset) + (depth_origin))                                   \
-                        : -1.0f / ((offset) + (depth_origin)))
-#define depth_offset(z, depth_origin)                                                              \
-    (DEPTH == PARALLEL  ? (z)                                                                      \
-     : DEPTH == SHIFTED ? (z) * (depth_origin) / (1.0f - (z))                                      \
-                        : -1.0f / (z) - (depth_origin))
-#define reciprocal_depth(z, depth_origin) (DEPTH == SHIFTED ? (1.0f - (z)) / (depth_origin) : -(z))
+#define depth_coordinate(offset, depths)                                                           \
+    ((depths).kind == PARALLEL  ? (offset)                                                         \
+     : (depths).kind == SHIFTED ? (offset) / ((offset) + (depths).origin)                          \
+                                : -1.0f / ((offset) + (depths).origin))
+
+inline Real depth_offset(Real z, Depths depths)
+{
+    if (depths.kind == PARALLEL)
+        return z;
+    if (depths.kind == SHIFTED)
+        return z * depths.origin / (1.0f - z);
+    return -1.0f / z - depths.origin;
+}
+
+inline Real reciprocal_depth(Real z, Depths depths)
+{
+    if (depths.kind == PARALLEL)
+        return 1.0f;
+    return depths.kind == SHIFTED ? (1.0f - z) / depths.origin : -z;
+}
 #endif
 
 // Value of a form at t.
@@ -80,25 +92,17 @@ inline Real list_form(__global const float *form, Real a, Real b, Real t)
 // Depth coordinate at t.
 inline Real list_depth(__global const float *forms, Real a, Real b, Real t)
 {
-    const Real depth = list_form(forms + DEPTH_FORM * FORM_SIZE, a, b, t);
-    if (DEPTH == PARALLEL)
-        return depth;
-    return depth / list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
+    return list_form(forms + DEPTH_FORM * FORM_SIZE, a, b, t) /
+           list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
 }
 
 // (u, v, depth coordinate) at t.
 inline Real3 list_point(__global const float *forms, Real a, Real b, Real t)
 {
-    Real3 point;
-    point.x = list_form(forms + U_FORM * FORM_SIZE, a, b, t);
-    point.y = list_form(forms + V_FORM * FORM_SIZE, a, b, t);
-    point.z = list_depth(forms, a, b, t);
-    if (DEPTH != PARALLEL) {
-        const Real denominator = list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
-        point.x /= denominator;
-        point.y /= denominator;
-    }
-    return point;
+    const Real denominator = list_form(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
+    return REAL3(list_form(forms + U_FORM * FORM_SIZE, a, b, t) / denominator,
+                 list_form(forms + V_FORM * FORM_SIZE, a, b, t) / denominator,
+                 list_depth(forms, a, b, t));
 }
 
 inline Real squared_slope(__global const float *form, Real a, Real b)

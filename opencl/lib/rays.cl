@@ -9,19 +9,12 @@
 // forms all six in float64 about a reference depth near the data, so that float32 is enough here
 // however far the eye or the origin is (docs/dev/conventions.md, "Rays"). y = 0 is the bottom row.
 //
-// -D DOUBLE_FLOAT_RAYS   rays may enter the data so far from there that it is not enough for the
-// positions of samples: six more
-//                  floats of each form are what float32 has rounded off the first six
-//                  (docs/dev/numerics.md)
+// Six more floats are what float32 has rounded off the first six, for rays that may enter the data
+// so far from there that it is not enough for the positions of samples (-D DOUBLE_FLOAT_RAYS,
+// docs/dev/numerics.md).
 #include "lib/double_float.cl"
 #include "lib/directions.cl"
 #pragma OPENCL FP_CONTRACT OFF
-
-#if DOUBLE_FLOAT_RAYS
-#define FORM_SIZE 12
-#else
-#define FORM_SIZE 6
-#endif
 
 // Value of a form at t = 0 for pixel offsets (a, b), and its slope along the ray, per unit of t.
 inline Real form_value(__global const float *form, Real a, Real b)
@@ -136,34 +129,18 @@ inline Rays rays_at(int2 corner, int width, int height)
     return rays;
 }
 
-// Those of part of a window, from the `first` on; x and y are of the part.
-inline Rays rays_of_part(uint first, int width, int height, int first_column, int columns,
-                         int first_row, int rows)
-{
-    Rays rays = rays_at(block_pixel(first, columns), columns, rows);
-    rays.a = offsets_from_middle(first_column + rays.x, width);
-    rays.b = offsets_from_middle(first_row + rays.y, height);
-    return rays;
-}
-
-// Pixel of a work-item for part of a window, in strips STRIP blocks high, each from left to right,
-// so that one work-item's lists are still cached when those above and below come to them: whole
-// columns of strips, a work-group each. `part` is its first column and strip, in columns and strips
-// of the window, how many columns it has in each strip, and how many strips.
-inline int2 part_pixel(int group, int item, int4 part)
-{
-    const int strip = group / part.z;
-    const int column = group - strip * part.z;
-    return (int2)((part.x + column) << 2 | (item & 3),
-                  (part.y + strip) * (4 * STRIP) + (item >> 2));
-}
-
-// The rays of a work-item whose group has a column of strips, by which it divides once.
+// The rays of a work-item for part of a window, in strips STRIP blocks high, each from left to
+// right, so that one work-item's lists are still cached when those above and below come to them:
+// whole columns of strips, a work-group each. `part` is its first column and strip, in columns and
+// strips of the window, how many columns it has in each strip, and how many strips.
 inline Rays rays_of_strips(int4 part, int width, int height)
 {
     const int item = (int)get_local_id(0) * LANES;
-    return rays_at(part_pixel(((int)get_global_id(0) * LANES - item) / COLUMN_ITEMS, item, part),
-                   width, height);
+    const int group = ((int)get_global_id(0) * LANES - item) / COLUMN_ITEMS;
+    const int strip = group / part.z, column = group - strip * part.z;
+    return rays_at(
+        (int2)((part.x + column) << 2 | (item & 3), (part.y + strip) * (4 * STRIP) + (item >> 2)),
+        width, height);
 }
 
 // Pixel of a work-item for some of a window's cells, squares of STRIP x STRIP blocks; `cells` are

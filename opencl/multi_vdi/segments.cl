@@ -7,7 +7,7 @@
 
 // What is written of rays.
 typedef struct {
-    __global float *rows;
+    __global float4 *pool;
     int capacity;      // slots of a ray
     Int slots;         // behind the last segments; beyond the capacity where there is no room
     Real reached;      // t, so that rounding puts no segment before the end of another
@@ -15,9 +15,9 @@ typedef struct {
     float depth_shift; // this VDI's reference depth less the frame's
 } Made;
 
-inline Int are_done(const Made *streams, const Frame *frame)
+inline Int are_done(const Made *streams, const Lists *lists)
 {
-    return streams->absorbed > frame->cutoff;
+    return streams->absorbed > lists->frame.cutoff;
 }
 
 // Append what the rays that are chosen cross of a medium, from r = from to r = to.
@@ -32,15 +32,19 @@ inline void take_medium(Made *streams, const ListRay *ray, Real from, Real to, R
             cut_to_part(&ray->kept, n, &kept_from, &kept_to);
         Segments segments;
         segments.color = medium;
-        segments.optical_depth =
+        segments.ends.w = 0.0f;
+        segments.OPTICAL_DEPTH =
             fmin(medium.w * length_between(ray, kept_from, kept_to), MAX_OPTICAL_DEPTH);
-        const Int appended = chosen && kept_from < kept_to && segments.optical_depth > 0.0f;
-        segments.from =
+        const Int appended = chosen && kept_from < kept_to && segments.OPTICAL_DEPTH > 0.0f;
+        segments.FROM =
             HIGHER_OF(ray_time(ray, kept_from) + streams->depth_shift, streams->reached);
-        segments.to = HIGHER_OF(ray_time(ray, kept_to) + streams->depth_shift, segments.from);
-        store_segments(streams->rows, streams->slots, streams->capacity, &segments, appended);
-        streams->reached = SELECT(streams->reached, segments.to, appended);
-        streams->absorbed += SELECT((Real)(0.0f), segments.optical_depth, appended);
+        segments.TO = HIGHER_OF(ray_time(ray, kept_to) + streams->depth_shift, segments.FROM);
+        // Of rays that append nothing it is stored over by what they append next
+        const Int places = places_of_slots(streams->slots, streams->capacity);
+        store_fours(streams->pool, places, segments.ends);
+        store_fours(streams->pool + 1, places, segments.color);
+        streams->reached = SELECT(streams->reached, segments.TO, appended);
+        streams->absorbed += SELECT((Real)(0.0f), segments.OPTICAL_DEPTH, appended);
         streams->slots += COUNT(appended);
     }
 }
@@ -69,7 +73,7 @@ segments(VDI_PARAMETERS,              // its cutoff is the optical depth behind 
          float depth_shift,           // this VDI's reference depth less the frame's
          float margin,                // pixels; see `contributes`
          int capacity,                // slots of a ray
-         __global float *pool,        // see multi_vdi/pool.cl
+         __global float4 *pool,       // see multi_vdi/pool.cl
          __global int *ends,          // (streams, rays): slot behind each stream's last
          __global uchar *contributes, // (streams, rays): 1 if a ray meets the VDI, 2 if its
                                       // neighbours at `margin` pixels meet its bounds, too
@@ -79,8 +83,7 @@ segments(VDI_PARAMETERS,              // its cutoff is the optical depth behind 
     const Rays pixel = rays_at(cell_pixel(cells + first_cell, first), frame.width, frame.height);
     if (!ANY(pixel.present))
         return;
-    const Lists lists = LISTS_OF(frame);
-    const Grid grid = GRID_OF(frame);
+    const Lists lists = LISTS_OF_PARAMETERS;
     const Int place = places_in_picture(pixel.x, pixel.y, pixel.present, frame.width, frame.height);
     // Light may have ended in a VDI before
     const Real dark_before = number > 0 ? LOAD_LANES(0, dark + first) : (Real)(INFINITY);
@@ -92,7 +95,7 @@ segments(VDI_PARAMETERS,              // its cutoff is the optical depth behind 
         pool_of(pool, first, capacity), capacity, first_slots, -INFINITY, 0.0f, depth_shift};
     Path path;
     begin_path(&path, forms, &frame, pixel.a, pixel.b, t_end, pixel.present);
-    follow(&streams, &path, &lists, &grid, &frame);
+    follow(&streams, &path, &lists);
     STORE_LANES(streams.slots, 0, ends + number * band_rays + first);
     const Real reached = fmin(dark_before, streams.reached);
     STORE_LANES(SELECT(dark_before, reached, streams.absorbed > frame.cutoff), 0, dark + first);

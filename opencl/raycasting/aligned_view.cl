@@ -28,11 +28,6 @@
 #define X_OF(lane) ((lane) % PACKET_BUNDLES * BUNDLE_WIDE + (lane) / PACKET_BUNDLES % BUNDLE_WIDE)
 #define Y_OF(lane) ((lane) / PACKET_BUNDLES / BUNDLE_WIDE)
 
-// The form of V_O's depth, or of that less a number
-#define Z_FORM (DEPTH == PARALLEL ? DEPTH_FORM : DENOMINATOR_FORM)
-// Reciprocal depth at a depth coordinate; times the depth origin if SHIFTED
-#define NEARNESS(z) (DEPTH == SHIFTED ? 1.0f - (z) : -(z))
-
 // The lists of a packet, bundle by bundle; of 8 bytes, lane by lane.
 typedef struct {
     int longest;                     // the most supersegments
@@ -55,13 +50,14 @@ inline PacketLists bundles_at(const Lists *in, int i, int j)
 {
     PacketLists lists;
     lists.longest = 0;
-    if (i < 0 || j < 0 || j >= in->high)
+    if (i < 0 || j < 0 || j >= in->frame.lists_high)
         return lists;
     OFFSET_T any_first = 0;
     for (int n = 0; n < PACKET_BUNDLES; ++n) {
         const int column = i + n * BUNDLE;
-        const ulong header =
-            column < in->wide ? (ulong)in->headers[BUNDLE_OF_LIST(column, j, in->wide)] : 0;
+        const ulong header = column < in->frame.lists_wide
+                                 ? in->headers[BUNDLE_OF_LIST(column, j, in->frame.lists_wide)]
+                                 : 0;
         lists.firsts[n] = first_of_header(header);
         lists.counts[n] = count_of_header(header);
         lists.longest = max(lists.longest, lists.counts[n]);
@@ -79,25 +75,24 @@ inline PacketLists lists_in_row(const Lists *in, int i, int j)
 {
     PacketLists lists;
     lists.longest = 0;
-    if (i < 0 || i >= in->wide || j < 0 || j >= in->high)
+    if (i < 0 || i >= in->frame.lists_wide || j < 0 || j >= in->frame.lists_high)
         return lists;
-    const int wide = min(in->wide - i, PACKET_WIDE);
-    __global const HEADER_T *const begins = in->headers + ((size_t)j * in->wide + i);
-    lists.begin = (OFFSET_T)begins[0];
-    if (begins[wide] == begins[0])
-        return lists;
+    const int wide = min(in->frame.lists_wide - i, PACKET_WIDE);
+    __global const ulong *const headers = in->headers + ((size_t)j * in->frame.lists_wide + i);
+    lists.begin = first_of_header(headers[0]);
     int counts[LANES], firsts[LANES], origins[LANES], strides[LANES];
     float per_codes[LANES];
     int any_lane = 0;
     for (int lane = 0; lane < LANES; ++lane) {
         const int dx = X_OF(lane);
-        const int first = dx < wide ? (int)((OFFSET_T)begins[dx] - lists.begin) + LIST_HEADER : 0;
-        counts[lane] =
-            dx < wide ? max((int)((OFFSET_T)begins[dx + 1] - lists.begin) - first, 0) : 0;
-        firsts[lane] = first;
+        const ulong header = dx < wide ? headers[dx] : headers[0];
+        counts[lane] = dx < wide ? count_of_header(header) : 0;
+        firsts[lane] = (int)(first_of_header(header) - lists.begin);
         any_lane = counts[lane] > 0 ? lane : any_lane;
         lists.longest = max(lists.longest, counts[lane]);
     }
+    if (lists.longest == 0)
+        return lists;
     for (int lane = 0; lane < LANES; ++lane) {
         firsts[lane] = firsts[counts[lane] > 0 ? lane : any_lane];
         __global const uint2 *const scale =
@@ -167,8 +162,7 @@ inline float8 faces_of_bundle(__global const ulong *faces, const PacketLists *li
 }
 
 // The k-th supersegments of all lists.
-inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k,
-                                float depth_origin)
+inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k, Depths depths)
 {
     PacketFaces at;
     if (PACKED) {
@@ -183,9 +177,8 @@ inline PacketFaces packet_faces(const Lists *in, const PacketLists *lists, int k
                      from[at_lane[12]], from[at_lane[13]], from[at_lane[14]], from[at_lane[15]]));
         at.words[0] = (Uint)(low_lanes.even, high_lanes.even);
         at.words[1] = (Uint)(low_lanes.odd, high_lanes.odd);
-        at.front = depths_of_codes(in, lists->origin, lists->stride, at.words[0], depth_origin);
-        at.back =
-            depths_of_codes(in, lists->origin, lists->stride, at.words[0] >> 14, depth_origin);
+        at.front = depths_of_codes(in, lists->origin, lists->stride, at.words[0], depths);
+        at.back = depths_of_codes(in, lists->origin, lists->stride, at.words[0] >> 14, depths);
     } else {
         const Real of_01 = (Real)(faces_of_bundle(in->faces, lists, 0, k),
                                   faces_of_bundle(in->faces, lists, 1, k));
@@ -211,7 +204,7 @@ KERNEL_OF_LANES void raycast_aligned_view(
     __global float4 *image)
 {
     const int width = frame.width, height = frame.height;
-    const Lists in = LISTS_OF(frame);
+    const Lists in = LISTS_OF_PARAMETERS;
     // Packets begin at multiples of their size, in lists
     const int first_i = -origin.x & -PACKET_WIDE, first_j = -origin.y & -BUNDLE_HIGH;
     const int packets_wide = (width - origin.x - first_i + PACKET_WIDE - 1) / PACKET_WIDE;
@@ -243,20 +236,26 @@ KERNEL_OF_LANES void raycast_aligned_view(
         }
         const Real a = offsets_from_middle(x + LANE_X, width);
         const Real b = offsets_from_middle(y + LANE_Y, height);
-        const Int wanted = IS_IN_WINDOW(LANE_X, LANE_Y) && i + LANE_X < in.wide &&
-                           j + LANE_Y < in.high && lists.count > 0;
+        const Int wanted = IS_IN_WINDOW(LANE_X, LANE_Y) && i + LANE_X < frame.lists_wide &&
+                           j + LANE_Y < frame.lists_high && lists.count > 0;
         Real t0 = -INFINITY, t1 = t_end;
         Int going =
             clip_to_planes(forms + PLANE_FORMS * FORM_SIZE, frame.planes, a, b, &t0, &t1) && wanted;
         const Real begin = list_depth(forms, a, b, select((Real)(0.0f), t0, going));
         const Real end = list_depth(forms, a, b, select((Real)(1.0f), t1, going));
-        // Model length per unit of V_O's depth
-        Real scale = model_speed(forms, a, b) / form_slope(forms + Z_FORM * FORM_SIZE, a, b);
-        if (DEPTH == SHIFTED)
-            scale *= frame.depth_origin;
+        // Model length per unit of V_O's depth, whose form is, up to a number, that of the offset
+        // or the denominator, and over the reciprocal depths at both ends: first + slope z, times
+        // the origin if SHIFTED
+        const Depths depths = {frame.depth_kind, frame.depth_origin};
+        const int z_form = depths.kind == PARALLEL ? DEPTH_FORM : DENOMINATOR_FORM;
+        Real scale = model_speed(forms, a, b) / form_slope(forms + z_form * FORM_SIZE, a, b);
+        if (depths.kind == SHIFTED)
+            scale *= depths.origin;
+        const Real first = depths.kind == RECIPROCAL ? 0.0f : 1.0f;
+        const Real slope = depths.kind == PARALLEL ? 0.0f : -1.0f;
         int k = 0;
         for (; k < lists.longest; ++k) {
-            const PacketFaces at = packet_faces(&in, &lists, k, frame.depth_origin);
+            const PacketFaces at = packet_faces(&in, &lists, k, depths);
             going = going && k < lists.count && at.front < end && !(seen.sums.w < frame.cutoff);
             const Real from = HIGHER_OF(at.front, begin);
             const Real to = LOWER_OF(at.back, end);
@@ -267,9 +266,8 @@ KERNEL_OF_LANES void raycast_aligned_view(
                 continue;
             }
             const Real4 medium = packet_media(&in, &lists, k, at);
-            Real lengths = scale * (to - from);
-            if (DEPTH != PARALLEL)
-                lengths /= NEARNESS(from) * NEARNESS(to);
+            const Real lengths =
+                scale * (to - from) / (fma(from, slope, first) * fma(to, slope, first));
             composite_medium(&seen, medium.w * lengths, medium, meet);
         }
         // The next packet, which comes to about the same depth: all at once, as loads in the loop

@@ -12,7 +12,7 @@ typedef struct {
     float r;
 } Made;
 
-inline bool are_done(const Made *met, const Frame *frame) { return met->hit; }
+inline bool are_done(const Made *met, const Lists *lists) { return met->hit; }
 
 // Is what a ray crosses of a medium, from r = from to r = to, a hit?
 inline void take_medium(Made *met, const ListRay *ray, float from, float to, float4 medium,
@@ -36,18 +36,11 @@ __kernel void first_hits(VDI_PARAMETERS, int4 part, float least_optical_depth, i
     const Rays pixel = rays_of_strips(part, frame.width, frame.height);
     if (!pixel.present)
         return;
-    const Lists lists = LISTS_OF(frame);
-    const Grid grid = GRID_OF(frame);
+    const Lists lists = LISTS_OF_PARAMETERS;
     const Int place = places_in_picture(pixel.x, pixel.y, true, frame.width, frame.height);
     Path path;
     begin_path(&path, forms, &frame, pixel.a, pixel.b, opaque_ends(place, opaque_depth), true);
-    const ListRay *ray = &path.ray;
     Made met = {least_optical_depth, accumulated, 0.0f, false, 0.0f};
-    follow(&met, &path, &lists, &grid, &frame);
-    // From r to t
-    float passed_by = ray->scale * (met.r - ray->r_begin);
-    if (DEPTH != PARALLEL)
-        passed_by /= reciprocal_depth(ray->start.z, ray->depths) * reciprocal_depth_at(ray, met.r);
-    image[place] =
-        met.hit ? ray->t_begin + passed_by / model_speed(forms, pixel.a, pixel.b) : INFINITY;
+    follow(&met, &path, &lists);
+    image[place] = met.hit ? ray_time(&path.ray, met.r) : INFINITY;
 }

@@ -23,7 +23,6 @@ typedef struct {
 // which CPUs have, they take an instruction less.
 typedef double Word;
 typedef double8 Words8;
-#define AS_WORD as_double
 
 // They are loaded in an order from which two shuffles within 128 bits make the halves of all.
 inline Words halves_of(Words8 first, Words8 second)
@@ -57,27 +56,16 @@ typedef struct {
 // The lists (i, j) of the rays that ask.
 inline ListMet list_met(const Lists *lists, Int i, Int j, Int asks)
 {
-    const Int bundle = select((Int)(0), BUNDLE_OF_LIST(i, j, lists->wide), asks);
-    ListMet list;
-    list.origin = list.stride = 0;
-#if PACKED
-    // Where it begins and ends, two numbers side by side
-    const Places in_memory = {bundle};
-    Place *at = in_memory.each;
-#define ENDS(k) AS_WORD(vload2(0, lists->headers + at[k]))
-    const Words ends = WORDS_OF(ENDS);
-#undef ENDS
-    list.first = AS_INT(ends.low) + LIST_HEADER;
-    list.count = max(AS_INT(ends.high) - list.first, 0);
-    // Any list's scales if it has none
-    const Words scales = words_at(lists->faces, select((Int)(0), AS_INT(ends.low), list.count > 0));
-    list.origin = AS_INT(scales.low);
-    list.stride = AS_INT(scales.high);
-#else
-    const Words header = words_at(lists->headers, bundle);
-    list.first = AS_INT(header.low) + PLACE_IN_BUNDLE(i, j);
-    list.count = AS_INT(header.high >> (FIRST_BITS - 32));
-#endif
+    const Words header = words_at(
+        lists->headers, select((Int)(0), BUNDLE_OF_LIST(i, j, lists->frame.lists_wide), asks));
+    ListMet list = {AS_INT(header.low) + PLACE_IN_BUNDLE(i, j),
+                    AS_INT(header.high >> (FIRST_BITS - 32)), 0, 0};
+    if (PACKED) { // any list's scales if it has none
+        const Words scales =
+            words_at(lists->faces, select((Int)(0), list.first - LIST_HEADER, list.count > 0));
+        list.origin = AS_INT(scales.low);
+        list.stride = AS_INT(scales.high);
+    }
     return list;
 }
 
@@ -129,8 +117,8 @@ inline List list_met(const Lists *lists, int i, int j, int asks) { return list_a
 
 inline Faces faces_met(const Lists *lists, List list, int n, int asks, bool away, Depths depths)
 {
-    const float2 face = face_of(lists, list, INDEX_MET(list, n, away), depths);
-    const Faces met = {away ? face.x : -face.y, away ? face.y : -face.x};
+    const float2 face = face_in_sense(lists, list, INDEX_MET(list, n, away), away, depths);
+    const Faces met = {face.x, face.y};
     return met;
 }
 

@@ -32,27 +32,6 @@ inline void count_supersegment(const Counted *grid, float front, float back, __g
         atomic_dec(cells + last + 1);
 }
 
-// Count those of lists of 8 bytes, whose faces are codes of depth (model/packing.py): one work-item
-// per list. Exact ones are counted where they are prepared (raycasting/prepare.cl).
-__kernel void count_packed(__global const ulong *starts,
-                           __global const int *origins,    // of the lists' depths, steps
-                           __global const ushort *strides, // steps per code
-                           __global const uint2 *words,
-                           float step, // of depth, world units
-                           Counted grid, __global uint *changes)
-{
-    const size_t list = get_global_id(0);
-    if (list >= (size_t)grid.width * (size_t)grid.height)
-        return;
-    __global uint *cells = cells_of_list(&grid, list, changes);
-    const int origin = origins[list], stride = strides[list];
-    for (ulong k = starts[list]; k < starts[list + 1]; ++k) {
-        const float front = (float)(origin + (int)(words[k].x & DEPTH_CODES) * stride) * step;
-        const float back = (float)(origin + (int)(words[k].x >> 14 & DEPTH_CODES) * stride) * step;
-        count_supersegment(&grid, front, back, cells);
-    }
-}
-
 // How many entries each bundle of lists takes, the longest list's length, and the first front and
 // the last back of each list that is not empty. One work-item per bundle.
 __kernel void measure_bundles(__global const ulong *starts, __global const float *fronts,
@@ -75,15 +54,6 @@ __kernel void measure_bundles(__global const ulong *starts, __global const float
         lengths[bundle] = most * BUNDLE * BUNDLE;
     if (most > *longest)
         atomic_max(longest, most);
-}
-
-// Headers of bundles (raycasting/supersegments.cl).
-__kernel void bundle_headers(__global const ulong *begins, uint bundles, __global ulong *headers)
-{
-    const size_t bundle = get_global_id(0);
-    if (bundle < bundles)
-        headers[bundle] = begins[bundle] | (begins[bundle + 1] - begins[bundle]) / (BUNDLE * BUNDLE)
-                                               << FIRST_BITS;
 }
 
 // One work-item per stack: its changes become counts.

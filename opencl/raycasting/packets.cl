@@ -80,26 +80,16 @@ inline void composite_met(Seen *seen, Met *met, const ListRay *rays, const Sense
     met->waits = 0;
 }
 
-// Where rays enter and leave the n-th supersegment that they come to, in their sense.
-inline float near_face(const Lists *lists, List list, int n, bool away, float depth_origin)
-{
-    return away ? face_of(lists, list, n, depth_origin).x
-                : -face_of(lists, list, list.count - 1 - n, depth_origin).y;
-}
-
-inline float far_face(const Lists *lists, List list, int n, bool away, float depth_origin)
-{
-    return away ? face_of(lists, list, n, depth_origin).y
-                : -face_of(lists, list, list.count - 1 - n, depth_origin).x;
-}
+// Where rays enter (.x) and leave (.y) the n-th supersegment that they come to.
+#define FACE_MET(n) face_in_sense(lists, list, INDEX_MET(list, n, away), away, depths)
 
 // Follow the rays that are `going`, which step the same way, through all lists that they cross.
 __attribute__((always_inline)) inline void sweep(Seen *seen, const ListRay *rays, const Axis *p,
                                                  const Axis *q, Int going, Int first_p, Int first_q,
-                                                 bool away, const Lists *lists, const Grid *grid,
-                                                 float depth_origin, float cutoff, bool sweep_v)
+                                                 bool away, const Lists *lists, bool sweep_v)
 {
     const Sense sense = sense_of(rays->along.z, rays->deep.z, away);
+    const Depths depths = rays->depths;
     const Real r_end = rays->r_begin + 1.0f;
     Met met;
     met.waits = 0;
@@ -116,18 +106,18 @@ __attribute__((always_inline)) inline void sweep(Seen *seen, const ListRay *rays
         const int P = place_p * p->step;
         Int column = now.p == place_p;
         const Int looks = column && new_stack;
-        if (grid->masks && ANY(looks)) {
+        if (lists->masks && ANY(looks)) {
             new_stack = new_stack && !looks;
             Int next_p = P, next_q = now.q * q->step, goes_on = looks;
             skip_empty_cells(&next_p, &next_q, &now.r, &now.depth, &goes_on, looks, p, q, &sense,
-                             grid, r_end, depth_origin);
+                             lists, r_end, depths);
             now.p = select(now.p, select((Int)(NOWHERE), next_p * p->step, goes_on), looks);
             now.q = select(now.q, next_q * q->step, looks);
             column = now.p == place_p;
         }
         const Real r_p = CROSSINGS(p, (Real)(P));
         // By the columns before: where a ray goes does not wait for what it sees in this one
-        const Int dark = seen->sums.w < cutoff;
+        const Int dark = seen->sums.w < lists->frame.cutoff;
         if (!ANY(column))
             continue;
         for (int place_q = least_of(now.q, column);; ++place_q) {
@@ -142,15 +132,14 @@ __attribute__((always_inline)) inline void sweep(Seen *seen, const ListRay *rays
 
             const List list = list_at(lists, FIRST_OF(P, Q), SECOND_OF(P, Q));
             n = min(n, list.count);
-            while (n > 0 &&
-                   ANY(here && far_face(lists, list, n - 1, away, depth_origin) > now.depth))
+            while (n > 0 && ANY(here && FACE_MET(n - 1).y > now.depth))
                 --n;
             for (int k = n; k < list.count; ++k) {
-                const float near = near_face(lists, list, k, away, depth_origin);
+                const float near = FACE_MET(k).x;
                 const Int come_to = here && near <= next_depth;
                 if (!ANY(come_to))
                     break;
-                const float far = far_face(lists, list, k, away, depth_origin);
+                const float far = FACE_MET(k).y;
                 const Int meet = come_to && far > now.depth;
                 if (!ANY(meet)) {
                     n = k + 1;
@@ -158,7 +147,7 @@ __attribute__((always_inline)) inline void sweep(Seen *seen, const ListRay *rays
                 }
                 if (ANY(meet && met.waits))
                     composite_met(seen, &met, rays, &sense);
-                const float4 medium = medium_of(lists, list, away ? k : list.count - 1 - k);
+                const float4 medium = medium_of(lists, list, INDEX_MET(list, k, away));
                 met.near = select(met.near, (Real)(near), meet);
                 met.far = select(met.far, (Real)(far), meet);
                 met.r = select(met.r, now.r, meet);
@@ -221,18 +210,14 @@ KERNEL_OF_LANES void raycast_packets(
     ListRay rays;
     begin_ray(&rays, forms, &frame, offsets_from_middle(x, frame.width),
               offsets_from_middle(y, frame.height), opaque_ends(pixels, opaque_depth), in_window);
-    const Lists lists = LISTS_OF(frame);
-    Grid grid = GRID_OF(frame);
-    if (sweep_v) { // p is v
-        grid.stacks_by_u = grid.stacks_by_v;
-        grid.stacks_by_v = 1;
-    }
-
+    const Lists lists = LISTS_OF_PARAMETERS;
     Seen seen = nothing_seen();
     Axis p = axis_of(FIRST_OF(rays.along.x, rays.along.y), FIRST_OF(rays.deep.x, rays.deep.y),
-                     FIRST_OF(lists.wide, lists.high));
+                     FIRST_OF(frame.lists_wide, frame.lists_high),
+                     FIRST_OF(1, STACKS_ALONG(frame.lists_wide)));
     Axis q = axis_of(SECOND_OF(rays.along.x, rays.along.y), SECOND_OF(rays.deep.x, rays.deep.y),
-                     SECOND_OF(lists.wide, lists.high));
+                     SECOND_OF(frame.lists_wide, frame.lists_high),
+                     SECOND_OF(1, STACKS_ALONG(frame.lists_wide)));
     const Int first_p = list_index(&p, FIRST_OF(rays.start.x, rays.start.y), 0);
     const Int first_q = list_index(&q, SECOND_OF(rays.start.x, rays.start.y), 0);
     // Rays that step the same way go on together: nearly always, all
@@ -244,11 +229,9 @@ KERNEL_OF_LANES void raycast_packets(
         take_step(&p, (way & 2) != 0);
         take_step(&q, (way & 4) != 0);
         if (way & 1)
-            sweep(&seen, &rays, &p, &q, going, first_p, first_q, true, &lists, &grid,
-                  frame.depth_origin, frame.cutoff, sweep_v);
+            sweep(&seen, &rays, &p, &q, going, first_p, first_q, true, &lists, sweep_v);
         else
-            sweep(&seen, &rays, &p, &q, going, first_p, first_q, false, &lists, &grid,
-                  frame.depth_origin, frame.cutoff, sweep_v);
+            sweep(&seen, &rays, &p, &q, going, first_p, first_q, false, &lists, sweep_v);
     }
     store_fours(image, pixels, composited(&seen));
 }

@@ -27,23 +27,24 @@ typedef struct {
 
 typedef struct {
     const ListRay *ray;
-    __global const ulong *masks;
+    const Lists *lists;
     __global const uint *counts; // supersegments in each cell: stacks_high, stacks_wide, SLABS
     int stacks_wide, stacks_high;
     float half_wide, half_high; // lists
-    float first_depth, slabs_per_depth;
 } Cells;
 
 inline int slab_at(const Cells *cells, float z)
 {
-    return slab_of(depth_offset(z, cells->ray->depths), cells->first_depth, cells->slabs_per_depth);
+    const Frame *frame = &cells->lists->frame;
+    return slab_of(depth_offset(z, cells->ray->depths), frame->first_depth, frame->slabs_per_depth);
 }
 
 // r where the depth coordinate reaches the near face of a slab, or an end of the ray; the ray is
 // not parallel to the slabs.
 inline float reaches_slab(const Cells *cells, int slab)
 {
-    const float face = cells->first_depth + (float)slab / cells->slabs_per_depth;
+    const Frame *frame = &cells->lists->frame;
+    const float face = frame->first_depth + (float)slab / frame->slabs_per_depth;
     return (depth_coordinate(face, cells->ray->depths) - cells->ray->deep.z) / cells->ray->along.z;
 }
 
@@ -64,8 +65,8 @@ inline void enter_stack(Walk *walk, const Cells *cells)
     walk->z_leave = fma(walk->r_leave, ray->along.z, ray->deep.z);
     const int enters = slab_at(cells, fma(walk->r, ray->along.z, ray->deep.z));
     const int leaves = slab_at(cells, walk->z_leave);
-    walk->left = cells->masks[walk->stack_j * cells->stacks_wide + walk->stack_i] &
-                 slabs_from(min(enters, leaves)) & slabs_to(max(enters, leaves));
+    walk->left = cells->lists->masks[walk->stack_j * cells->stacks_wide + walk->stack_i] &
+                 ~0UL << min(enters, leaves) & ~0UL >> (SLABS - 1 - max(enters, leaves));
 }
 
 inline Walk begin_walk(const Cells *cells)
@@ -131,8 +132,6 @@ inline bool next_cell(Walk *walk, const Cells *cells, CellCrossing *crossing)
 // r at a share of a crossing's length.
 inline float r_at(const CellCrossing *crossing, float share, const ListRay *ray)
 {
-    if (DEPTH == PARALLEL)
-        return mix(crossing->from, crossing->to, share);
     // Linear in model space: projective here, weighted by the depths of the ends
     const float near_end = (1.0f - share) * reciprocal_depth_at(ray, crossing->to);
     const float far_end = share * reciprocal_depth_at(ray, crossing->from);
@@ -144,8 +143,9 @@ inline float4 medium_at(const ListRay *ray, float r, const Lists *lists, int *gu
 {
     const float z = fma(r, ray->along.z, ray->deep.z);
     const float u = fma(r, ray->along.x, ray->deep.x), v = fma(r, ray->along.y, ray->deep.y);
-    const int i = clamp((int)floor(u + 0.5f * (float)lists->wide), 0, lists->wide - 1);
-    const int j = clamp((int)floor(v + 0.5f * (float)lists->high), 0, lists->high - 1);
+    const int wide = lists->frame.lists_wide, high = lists->frame.lists_high;
+    const int i = clamp((int)floor(u + 0.5f * (float)wide), 0, wide - 1);
+    const int j = clamp((int)floor(v + 0.5f * (float)high), 0, high - 1);
     const List list = list_at(lists, i, j);
     Search search = begin_search(*guess);
     Faces face;
@@ -174,16 +174,14 @@ preview(VDI_PARAMETERS,
         image[place] = (float4)(0.0f);
         return;
     }
-    const Lists lists = LISTS_OF(frame);
+    const Lists lists = LISTS_OF_PARAMETERS;
     const Cells cells = {&ray,
-                         masks,
+                         &lists,
                          counts,
-                         STACKS_ALONG(lists.wide),
-                         STACKS_ALONG(lists.high),
-                         0.5f * (float)lists.wide,
-                         0.5f * (float)lists.high,
-                         frame.first_depth,
-                         frame.slabs_per_depth};
+                         STACKS_ALONG(frame.lists_wide),
+                         STACKS_ALONG(frame.lists_high),
+                         0.5f * (float)frame.lists_wide,
+                         0.5f * (float)frame.lists_high};
 
     // Sum up the weight of all cells that the ray crosses
     float weight = 0.0f;

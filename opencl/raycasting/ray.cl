@@ -4,9 +4,8 @@
 // r runs along a ray over an interval of length 1 and is 0 at the end that is deeper in V_O, where
 // the interpolated 1/Z is smallest and its rounding matters most.
 //
-// -D DOUBLE_FLOAT_RAYS=2    r is 0 at the other end, `deep` is that one and Z_deep is its depth:
-// the
-//                           lists lie near it. LANES is 1
+// With DOUBLE_FLOAT_RAYS, where LANES is 1, and lists that lie near the other end, r is 0 there,
+// `deep` is that one and Z_deep is its depth.
 #include "lib/list_space.cl"
 #include "lib/cropping.cl"
 #include "raycasting/supersegments.cl"
@@ -19,10 +18,9 @@ typedef struct {
     Int away;          // from V_O: depth does not decrease along the ray
     Depths depths;
     Real r_begin;         // 0 or -1; it ends at r_begin + 1
-    Real scale;           // model length per unit of r, but for w(r_a) w(r_b) in perspective
-    Real w_deep, w_along; // of sixteen rays, 1 / Z is w_deep + r w_along: fewer operations
-    Real t_begin, t_deep; // t where it begins, and where r is 0
-    Real t_scale;         // t per unit of r, but for the division by w(r) in perspective
+    Real w_deep, w_along; // w(r) = w_deep + r w_along is 1 / Z, or 1 in parallel projection
+    Real scale;           // model length per unit of r, but for the division by w(r_a) w(r_b)
+    Real t_deep, t_scale; // t where r is 0; t per unit of r, but for the division by w(r)
     uint regions;         // of cropping that are kept, see lib/cropping.cl; 0: all
     Kept kept;            // parts of it, in r, if CROPPED
 } ListRay;
@@ -35,7 +33,7 @@ typedef struct {
 #ifdef DOUBLE_FLOAT_RAYS
 typedef float2 Time;
 #define NEAREST_FLOAT(t) (t).x
-#define ENDS_AT_ZERO(away) (DOUBLE_FLOAT_RAYS == 2 ? !(away) : (away)) // whether r is 0 at the end
+#define ENDS_AT_ZERO(away) (frame->lists_near ? !(away) : (away)) // whether r is 0 at the end
 
 inline bool clip_ray(__global const float *planes, int count, float a, float b, float t_end,
                      bool wanted, Time *t0, Time *t1, float *t_length)
@@ -53,14 +51,13 @@ inline float form_on_ray(__global const float *form, float a, float b, Time t)
 }
 
 inline Depths depths_of_ray(__global const float *forms, float a, float b, Time t0, Time t1,
-                            float depth_origin)
+                            const Frame *frame)
 {
     const float2 start = form_at(forms + DEPTH_FORM * FORM_SIZE, a, b, t0);
     const float2 end = form_at(forms + DEPTH_FORM * FORM_SIZE, a, b, t1);
-    Depths depths;
+    Depths depths = {frame->depth_kind, frame->depth_origin};
     depths.deep = ENDS_AT_ZERO(!double_float_less(end, start)) ? end : start;
-    depths.reciprocal = 1.0f / (depths.deep.x + depth_origin);
-    depths.depth_origin = depth_origin;
+    depths.reciprocal = depths.kind == PARALLEL ? 1.0f : 1.0f / (depths.deep.x + depths.origin);
     return depths;
 }
 
@@ -71,10 +68,8 @@ inline float3 point_of_offset(__global const float *forms, float a, float b, Tim
     const float u = form_on_ray(forms + U_FORM * FORM_SIZE, a, b, t);
     const float v = form_on_ray(forms + V_FORM * FORM_SIZE, a, b, t);
     const float beyond = double_float_sum(offset, -depths.deep).x;
-    const float d =
-        DEPTH == PARALLEL ? 1.0f : form_on_ray(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
-    const float scale = DEPTH == PARALLEL ? 1.0f : depths.reciprocal;
-    return (float3)(u / d, v / d, beyond * scale / d);
+    const float d = form_on_ray(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t);
+    return (float3)(u / d, v / d, beyond * depths.reciprocal / d);
 }
 
 #define point_on_ray(forms, a, b, t, depths)                                                       \
@@ -84,7 +79,8 @@ typedef Real Time;
 #define NEAREST_FLOAT(t) (t)
 #define ENDS_AT_ZERO(away) (away)
 #define form_on_ray(form, a, b, t) list_form(form, a, b, t)
-#define depths_of_ray(forms, a, b, t0, t1, depth_origin) (depth_origin)
+#define depths_of_ray(forms, a, b, t0, t1, frame)                                                  \
+    ((Depths){(frame)->depth_kind, (frame)->depth_origin})
 #define point_on_ray(forms, a, b, t, depths) list_point(forms, a, b, t)
 
 inline Int clip_ray(__global const float *planes, int count, Real a, Real b, Real t_end, Int wanted,
@@ -100,12 +96,9 @@ inline Int clip_ray(__global const float *planes, int count, Real a, Real b, Rea
 }
 #endif
 
-// 1 / Z at r. Not used in parallel projection.
 inline Real reciprocal_depth_at(const ListRay *ray, Real r)
 {
-    if (LANES > 1)
-        return fma(r, ray->w_along, ray->w_deep);
-    return reciprocal_depth(fma(r, ray->along.z, ray->deep.z), ray->depths);
+    return fma(r, ray->w_along, ray->w_deep);
 }
 
 // The kept parts of a ray from t_deep, where r is 0, to t_other. Over the homogeneous denominator,
@@ -115,11 +108,8 @@ inline Kept kept_parts_of_ray(__global const float *forms, int planes, Real a, R
 {
     __global const float *form = forms + (PLANE_FORMS + planes) * FORM_SIZE;
     Real at_deep[CROPPING_PLANES], at_other[CROPPING_PLANES];
-    Real w_deep = 1.0f, w_other = 1.0f;
-    if (DEPTH != PARALLEL) {
-        w_deep = 1.0f / form_on_ray(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t_deep);
-        w_other = 1.0f / form_on_ray(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t_other);
-    }
+    const Real w_deep = 1.0f / form_on_ray(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t_deep);
+    const Real w_other = 1.0f / form_on_ray(forms + DENOMINATOR_FORM * FORM_SIZE, a, b, t_other);
     for (int k = 0; k < CROPPING_PLANES; ++k, form += FORM_SIZE) {
         at_deep[k] = form_on_ray(form, a, b, t_deep) * w_deep;
         at_other[k] = form_on_ray(form, a, b, t_other) * w_other;
@@ -139,7 +129,7 @@ inline void begin_ray(ListRay *ray, __global const float *forms, const Frame *fr
     ray->present = clip_ray(forms + PLANE_FORMS * FORM_SIZE, frame->planes, a, b, t_end, wanted,
                             &t0, &t1, &t_length);
     // Bring both ends to list space
-    ray->depths = depths_of_ray(forms, a, b, t0, t1, frame->depth_origin);
+    ray->depths = depths_of_ray(forms, a, b, t0, t1, frame);
     ray->start = point_on_ray(forms, a, b, t0, ray->depths);
     const Real3 end = point_on_ray(forms, a, b, t1, ray->depths);
     ray->along = REAL3(end.x - ray->start.x, end.y - ray->start.y, end.z - ray->start.z);
@@ -156,20 +146,15 @@ inline void begin_ray(ListRay *ray, __global const float *forms, const Frame *fr
     const Real r_other = SELECT((Real)(1.0f), (Real)(-1.0f), ends_at_zero);
     const Time t_deep = SELECT(t0, t1, ends_at_zero), t_other = SELECT(t1, t0, ends_at_zero);
     // Lengths and t per unit of r
-    ray->t_begin = NEAREST_FLOAT(t0);
     ray->t_deep = NEAREST_FLOAT(t_deep);
-    ray->t_scale = t_length;
-    ray->scale = t_length * model_speed(forms, a, b);
-    ray->w_deep = ray->w_along = 0.0f;
-    if (DEPTH != PARALLEL) {
-        ray->scale *=
-            reciprocal_depth(ray->start.z, ray->depths) * reciprocal_depth(end.z, ray->depths);
-        ray->w_deep = reciprocal_depth(ray->deep.z, ray->depths);
-        ray->w_along = -ray->along.z;
-        if (DEPTH == SHIFTED)
-            ray->w_along /= frame->depth_origin;
-        ray->t_scale *= reciprocal_depth_at(ray, r_other); // rounded as along the ray
-    }
+    ray->w_deep = reciprocal_depth(ray->deep.z, ray->depths);
+    ray->w_along = ray->depths.kind == PARALLEL  ? (Real)(0.0f)
+                   : ray->depths.kind == SHIFTED ? -ray->along.z / ray->depths.origin
+                                                 : -ray->along.z;
+    ray->scale =
+        t_length * model_speed(forms, a, b) *
+        (reciprocal_depth(ray->start.z, ray->depths) * reciprocal_depth(end.z, ray->depths));
+    ray->t_scale = t_length * reciprocal_depth_at(ray, r_other); // rounded as along the ray
     if (CROPPED) {
         ray->kept =
             kept_parts_of_ray(forms, frame->planes, a, b, t_deep, t_other, r_other, frame->regions);
@@ -181,16 +166,12 @@ inline void begin_ray(ListRay *ray, __global const float *forms, const Frame *fr
 // end is r w_shallow / w(r): small where r is, so that nothing cancels there.
 inline Real ray_time(const ListRay *ray, Real r)
 {
-    if (DEPTH == PARALLEL)
-        return fma(r, ray->t_scale, ray->t_deep);
     return ray->t_deep + r * ray->t_scale / reciprocal_depth_at(ray, r);
 }
 
 // Model length from r = from to r = to.
 inline Real length_between(const ListRay *ray, Real from, Real to)
 {
-    if (DEPTH == PARALLEL)
-        return ray->scale * (to - from);
     return ray->scale * (to - from) /
            (reciprocal_depth_at(ray, from) * reciprocal_depth_at(ray, to));
 }

@@ -6,7 +6,10 @@
 
 typedef Seen Made;
 
-inline Int are_done(const Seen *seen, const Frame *frame) { return seen->sums.w < frame->cutoff; }
+inline Int are_done(const Seen *seen, const Lists *lists)
+{
+    return seen->sums.w < lists->frame.cutoff;
+}
 
 // Composite what the rays that are chosen cross of a medium, from r = from to r = to. medium.w is
 // the extinction: optical depth for each unit of model length.
@@ -25,13 +28,12 @@ KERNEL_OF_LANES void raycast(VDI_PARAMETERS,
     const Rays pixel = rays_of_strips(part, frame.width, frame.height);
     if (!ANY(pixel.present))
         return;
-    const Lists lists = LISTS_OF(frame);
-    const Grid grid = GRID_OF(frame);
+    const Lists lists = LISTS_OF_PARAMETERS;
     const Int place = places_in_picture(pixel.x, pixel.y, pixel.present, frame.width, frame.height);
     Path path;
     begin_path(&path, forms, &frame, pixel.a, pixel.b, opaque_ends(place, opaque_depth),
                pixel.present);
     Seen seen = nothing_seen();
-    follow(&seen, &path, &lists, &grid, &frame);
+    follow(&seen, &path, &lists);
     store_fours(image, place, composited(&seen));
 }

@@ -13,11 +13,6 @@ inline Int slab_of(Real offset, float first_depth, float slabs_per_depth)
     return TO_INT(clamp((offset - first_depth) * slabs_per_depth, 0.0f, (float)(SLABS - 1)));
 }
 
-// The slabs from `slab` on to the deepest, and those from the first one to `slab`.
-inline ulong slabs_from(int slab) { return ~0UL << slab; }
-
-inline ulong slabs_to(int slab) { return ~0UL >> (SLABS - 1 - slab); }
-
 // The nearest occupied slab from `slab` on, in the rays' sense, of masks whose halves are `low` and
 // `high`; *nothing: rays that have none ahead. By halves, as few processors count bits of 64-bit
 // words in vectors.

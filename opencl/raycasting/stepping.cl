@@ -50,10 +50,11 @@ typedef struct {
     Border border;      // from a list's index to its border ahead
     float middle;       // half of the lists
     int lists;
+    int by_stack; // from a stack to the next one in the occupancy grid
 } Axis;
 
 // An axis along which rays have a coordinate deep + r along; take_step says which way they step.
-inline Axis axis_of(Real along, Real deep, int lists)
+inline Axis axis_of(Real along, Real deep, int lists, int by_stack)
 {
     Axis axis;
     axis.along = along;
@@ -63,6 +64,7 @@ inline Axis axis_of(Real along, Real deep, int lists)
     axis.inverse = SELECT((Real)(1.0f), 1.0f / along, along != 0.0f);
     axis.middle = 0.5f * (float)lists;
     axis.lists = lists;
+    axis.by_stack = by_stack;
     return axis;
 }
 
@@ -88,17 +90,6 @@ inline Int are_outside(const Axis *u, const Axis *v, Int i, Int j)
 {
     return i < 0 || i >= u->lists || j < 0 || j >= v->lists;
 }
-
-// The occupancy grid.
-typedef struct {
-    __global const ulong *masks;  // of the stacks
-    int stacks_by_u, stacks_by_v; // from a stack to the next one by either axis
-    float first_depth;            // where slab 0 begins, view depth less depth_origin
-    float slabs_per_depth;
-} Grid;
-
-#define GRID_OF(frame)                                                                             \
-    {masks, 1, STACKS_ALONG((frame).lists_wide), (frame).first_depth, (frame).slabs_per_depth}
 
 // The last index in a stack, in the rays' sense.
 inline Int stack_edge(const Axis *axis, Int index)
@@ -131,17 +122,17 @@ inline Real r_entered(const Axis *axis, Real r, Int from, Int to)
 // rays that look, from lists (i, j) along axes u and v; those that come to an end are not `active`
 // any more. In a loop of its own, so that rays meet again behind it. Returns which have moved.
 inline Int skip_empty_cells(Int *i, Int *j, Real *r, Real *depth, Int *active, Int looks,
-                            const Axis *u, const Axis *v, const Sense *sense, const Grid *grid,
+                            const Axis *u, const Axis *v, const Sense *sense, const Lists *lists,
                             Real r_end, Depths depths)
 {
+    const Frame *frame = &lists->frame;
     Int moved = 0;
     while (ANY(looks)) {
         // Is the cell empty? Which is the nearest that is not, in this stack?
-        const Int stack =
-            (*j >> STACK_SHIFT) * grid->stacks_by_v + (*i >> STACK_SHIFT) * grid->stacks_by_u;
-        const Words mask = words_at(grid->masks, SELECT((Int)(0), stack, looks));
-        const Int slab = slab_of(depth_offset(sense->sign * *depth, depths), grid->first_depth,
-                                 grid->slabs_per_depth);
+        const Int stack = (*j >> STACK_SHIFT) * v->by_stack + (*i >> STACK_SHIFT) * u->by_stack;
+        const Words mask = words_at(lists->masks, SELECT((Int)(0), stack, looks));
+        const Int slab = slab_of(depth_offset(sense->sign * *depth, depths), frame->first_depth,
+                                 frame->slabs_per_depth);
         Int nothing;
         const Int nearest = nearest_slab(mask.low, mask.high, slab, sense->away, &nothing);
         const Int passes = looks && (nothing || nearest != slab);
@@ -150,8 +141,8 @@ inline Int skip_empty_cells(Int *i, Int *j, Real *r, Real *depth, Int *active, I
         // Up to its face, or the stack's border, nothing is met: jump there
         const Int edge_i = stack_edge(u, *i), edge_j = stack_edge(v, *j);
         const Real r_border = fmin(crossings(u, edge_i), crossings(v, edge_j));
-        const Real face = grid->first_depth +
-                          TO_REAL(sense->away ? nearest : nearest + 1) / grid->slabs_per_depth;
+        const Real face = frame->first_depth +
+                          TO_REAL(sense->away ? nearest : nearest + 1) / frame->slabs_per_depth;
         const Real r_face =
             (sense->sign * depth_coordinate(face, depths) - sense->deep) * sense->inverse;
         const Real r_until =

@@ -4,9 +4,10 @@
 // Lists lie in memory by bundles of BUNDLE x BUNDLE: the first supersegments of the bundle's lists,
 // then the second ones, and so on, up to the longest list's last; a list that ends before is filled
 // up with NO_FACE. So rays next to each other read what lies next to each other. A bundle's header
-// says where its entries begin and how long its longest list is, in one word. Lists of 8-byte
-// supersegments lie one behind the other; one that is not empty begins with LIST_HEADER words:
-// (origin, stride), in steps of depth, and (1 over the model length of a code of depth, unused).
+// is one word, of which FIRST_BITS say where its entries begin, the others how long its longest
+// list is. Lists of 8-byte supersegments are bundles of one, which lie one behind the other; before
+// one that is not empty lie LIST_HEADER words: (origin, stride), in steps of depth, and (1 over the
+// model length of a code of depth, unused).
 //
 // -D OFFSET_T=int, long   type of an offset into the supersegments
 // -D PACKED=0, 1          supersegments of 24 bytes, in two arrays; or of 8, in one
@@ -14,56 +15,41 @@
 #include "lib/list_space.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-#if PACKED
-#define HEADER_T OFFSET_T // where the list begins; the next one's is where it ends
-#else
-#define HEADER_T ulong // FIRST_BITS say where the entries begin, the others how many of each list
-#endif
 #define LIST_SHIFT (PACKED ? 0 : BUNDLE_SHIFT)
 #define LISTS_PER_BUNDLE (1 << 2 * LIST_SHIFT)
 #define NO_FACE (float2)(INFINITY, INFINITY) // beyond every ray, from whichever side
 #define WORDS_PER_LINE 8                     // of 8 bytes, in a line of the cache
 #define TAU_BASE ((127 - 18) << 7)           // of an optical depth of 12 bits
 
-// The lists of a VDI.
-typedef struct {
-    __global const HEADER_T *headers;
-    __global const ulong *faces; // if packed, the supersegments
-    __global const ulong *media; // straight RG, then B and extinction; none if packed
-    int wide, high;
-    float depth_step, nearest_offset;
-} Lists;
-
 // What every kernel takes that draws a frame (pyvista_vdi/raycasting/scene.py).
 typedef struct {
     int lists_wide, lists_high;       // window of V_O
     int width, height;                // window of V_N
     int planes;                       // to clip to, of the forms
+    int depth_kind, lists_near;       // see lib/list_space.cl; which end 1 / Z_deep is of
     float depth_origin;               // world units
     float cutoff;                     // a ray ends where less transmittance than this is left
     float first_depth;                // where slab 0 begins, view depth less depth_origin
     float slabs_per_depth;            // per world unit
     float depth_step, nearest_offset; // of 8-byte lists: of depth; least in front of the eye
-    uint regions;                     // of cropping that are kept, see lib/cropping.cl
+    uint regions;                     // of cropping that are kept, see lib/cropping.cl; 0: all
     int one_list;                     // whether a ray stays in a list
 } Frame;
 
-#define BLOCK 4 // rays along each edge of a block, in which pixels are dealt to work-items
+// The lists of a VDI, and the frame that is drawn of them.
+typedef struct {
+    __global const ulong *headers;
+    __global const ulong *faces; // if packed, the supersegments
+    __global const ulong *media; // straight RG, then B and extinction; none if packed
+    __global const ulong *masks; // of the occupancy grid's stacks: occupied slabs; 0: not skipped
+    Frame frame;
+} Lists;
+
 #define VDI_PARAMETERS                                                                             \
-    __global const HEADER_T *headers, __global const ulong *faces, __global const ulong *media,    \
-        __global const float *forms,        /* see begin_ray */                                    \
-        __global const float *opaque_depth, /* t at which each pixel's ray ends; 0: none does */   \
-        __global const ulong                                                                       \
-            *masks, /* of the occupancy grid's stacks: occupied slabs; 0: not skipped */           \
-        Frame frame
-#define LISTS_OF(frame)                                                                            \
-    {headers,                                                                                      \
-     faces,                                                                                        \
-     media,                                                                                        \
-     (frame).lists_wide,                                                                           \
-     (frame).lists_high,                                                                           \
-     (frame).depth_step,                                                                           \
-     (frame).nearest_offset}
+    __global const ulong *headers, __global const ulong *faces, __global const ulong *media,       \
+        __global const ulong *masks, Frame frame, __global const float *forms, /* see begin_ray */ \
+        __global const float *opaque_depth /* t at which each pixel's ray ends; 0: none does */
+#define LISTS_OF_PARAMETERS {headers, faces, media, masks, frame}
 
 typedef struct {
     OFFSET_T first;     // entry of its first supersegment
@@ -97,26 +83,13 @@ inline float2 two_floats(ulong word)
 // List (i, j).
 inline List list_at(const Lists *lists, int i, int j)
 {
-    const int bundle = BUNDLE_OF_LIST(i, j, lists->wide);
-    List list;
-    list.origin = list.stride = 0;
-    list.per_code = 0.0f;
-    if (PACKED) {
-        const OFFSET_T begin = (OFFSET_T)lists->headers[bundle];
-        list.first = begin + LIST_HEADER;
-        list.count = (int)((OFFSET_T)lists->headers[bundle + 1] - list.first);
-        if (list.count > 0) {
-            const ulong scale = lists->faces[begin];
-            list.origin = as_int((uint)scale);
-            list.stride = as_int((uint)(scale >> 32));
-            list.per_code = as_float((uint)lists->faces[begin + 1]);
-        } else {
-            list.count = 0;
-        }
-    } else {
-        const ulong header = (ulong)lists->headers[bundle];
-        list.first = first_of_header(header) + PLACE_IN_BUNDLE(i, j);
-        list.count = count_of_header(header);
+    const ulong header = lists->headers[BUNDLE_OF_LIST(i, j, lists->frame.lists_wide)];
+    List list = {first_of_header(header) + PLACE_IN_BUNDLE(i, j), count_of_header(header), 0, 0};
+    if (PACKED && list.count > 0) {
+        const ulong scale = lists->faces[list.first - LIST_HEADER];
+        list.origin = as_int((uint)scale);
+        list.stride = as_int((uint)(scale >> 32));
+        list.per_code = as_float((uint)lists->faces[list.first - 1]);
     }
     return list;
 }
@@ -126,9 +99,8 @@ inline List list_at(const Lists *lists, int i, int j)
 inline float depth_of_code(const Lists *lists, List list, uint code, Depths depths)
 {
     const float offset =
-        (float)(list.origin + as_int(code & DEPTH_CODES) * list.stride) * lists->depth_step;
-    const float before = DEPTH == PARALLEL ? offset : fmax(offset, lists->nearest_offset);
-    return depth_coordinate(before, depths);
+        (float)(list.origin + as_int(code & DEPTH_CODES) * list.stride) * lists->frame.depth_step;
+    return depth_coordinate(fmax(offset, lists->frame.nearest_offset), depths);
 }
 
 // Front and back of supersegment k of a list, 0 <= k < list.count.
@@ -145,6 +117,13 @@ inline float2 face_of(const Lists *lists, List list, int k, Depths depths)
     return face.x < INFINITY
                ? (float2)(depth_coordinate(face.x, depths), depth_coordinate(face.y, depths))
                : NO_FACE;
+}
+
+// Where a ray enters and leaves it, in its sense (raycasting/lists.cl).
+inline float2 face_in_sense(const Lists *lists, List list, int k, bool away, Depths depths)
+{
+    const float2 face = face_of(lists, list, k, depths);
+    return away ? face : -face.yx;
 }
 
 // Its medium; undefined for NO_FACE.
@@ -169,9 +148,9 @@ inline float4 medium_of(const Lists *lists, List list, int k)
 // Depth coordinates of codes of 14 bits, in lists of these origins and strides: depth_of_code.
 inline Real depths_of_codes(const Lists *lists, Int origin, Int stride, Uint codes, Depths depths)
 {
-    const Real offset = TO_REAL(origin + AS_INT(codes & DEPTH_CODES) * stride) * lists->depth_step;
-    const Real before = DEPTH == PARALLEL ? offset : fmax(offset, lists->nearest_offset);
-    return depth_coordinate(before, depths);
+    const Real offset =
+        TO_REAL(origin + AS_INT(codes & DEPTH_CODES) * stride) * lists->frame.depth_step;
+    return depth_coordinate(fmax(offset, lists->frame.nearest_offset), depths);
 }
 
 // Media of supersegments by their words, in lists of these scales: medium_of.
@@ -204,15 +183,10 @@ inline void prefetch_share(__global const ulong *words, OFFSET_T first, int coun
 // Bring list (i, j) close; each list of a bundle brings its share.
 inline void prefetch_list(const Lists *lists, int i, int j)
 {
-    const int bundle = BUNDLE_OF_LIST(i, j, lists->wide);
-    const ulong header = (ulong)lists->headers[bundle];
-    if (PACKED) {
-        prefetch_share(lists->faces, (OFFSET_T)header,
-                       (int)((OFFSET_T)lists->headers[bundle + 1] - (OFFSET_T)header), 1, 0);
-        return;
-    }
+    const ulong header = lists->headers[BUNDLE_OF_LIST(i, j, lists->frame.lists_wide)];
     const OFFSET_T first = first_of_header(header);
     const int count = count_of_header(header), share = PLACE_IN_BUNDLE(i, j);
     prefetch_share(lists->faces, first, count, 1, share);
-    prefetch_share(lists->media, first, count, 2, share);
+    if (!PACKED)
+        prefetch_share(lists->media, first, count, 2, share);
 }

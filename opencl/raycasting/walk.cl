@@ -30,8 +30,9 @@ inline void begin_path(Path *path, __global const float *forms, const Frame *fra
                        Real t_end, Int wanted)
 {
     begin_ray(&path->ray, forms, frame, a, b, t_end, wanted);
-    path->u = axis_of(path->ray.along.x, path->ray.deep.x, frame->lists_wide);
-    path->v = axis_of(path->ray.along.y, path->ray.deep.y, frame->lists_high);
+    path->u = axis_of(path->ray.along.x, path->ray.deep.x, frame->lists_wide, 1);
+    path->v = axis_of(path->ray.along.y, path->ray.deep.y, frame->lists_high,
+                      STACKS_ALONG(frame->lists_wide));
     take_step(&path->u, path->u.along > 0.0f);
     take_step(&path->v, path->v.along > 0.0f);
 }
@@ -41,13 +42,15 @@ inline Real lists_crossed(const Path *path) { return fabs(path->u.along) + fabs(
 // Bring the lists close that rays begin and end in, if they cross few: those in between are others'
 // ends. Of blocks, and of rays in one list, those of the next column of blocks, which come while
 // this one's are walked through.
-inline void prefetch_ends(const Path *path, const Lists *lists, const Frame *frame)
+inline void prefetch_ends(const Path *path, const Lists *lists)
 {
     const Int few = path->ray.present && lists_crossed(path) < LISTS_TO_PREFETCH;
     if (!ANY(few))
         return;
     const Axis *u = &path->u, *v = &path->v;
-    const int shift = LANES > 1 || frame->one_list ? BLOCK * lists->high / frame->height : 0;
+    const int shift = LANES > 1 || lists->frame.one_list
+                          ? BLOCK * lists->frame.lists_high / lists->frame.height
+                          : 0;
     const Real r_end = path->ray.r_begin + 1.0f;
     const Places first_i = {list_index(u, path->ray.start.x, shift)};
     const Places first_j = {list_index(v, path->ray.start.y, 0)};
@@ -152,17 +155,16 @@ inline void step_on(Cursor *at, const Crossing *crossing, const Path *path, Int 
 
 // Follow the rays that are `active`, of which all go away or come back.
 __attribute__((always_inline)) inline void follow_in_sense(Made *made, const Path *path, Int active,
-                                                           bool away, const Lists *lists,
-                                                           const Grid *grid, const Frame *frame)
+                                                           bool away, const Lists *lists)
 {
     const Sense sense = sense_of(path->ray.along.z, path->ray.deep.z, away);
     Cursor at = begin_walk(path, &sense, active);
     for (int turn = 0; ANY(at.active); ++turn) {
         // Skip cells of the occupancy grid that no supersegment reaches (section 4)
-        if (grid->masks && turn % TURNS_PER_LOOK == 0 && ANY(at.new_stack && at.active)) {
+        if (lists->masks && turn % TURNS_PER_LOOK == 0 && ANY(at.new_stack && at.active)) {
             const Int moved = skip_empty_cells(
                 &at.i, &at.j, &at.r, &at.depth, &at.active, at.new_stack && at.active, &path->u,
-                &path->v, &sense, grid, path->ray.r_begin + 1.0f, path->ray.depths);
+                &path->v, &sense, lists, path->ray.r_begin + 1.0f, path->ray.depths);
             search_again(&at.search, moved);
             at.new_stack = 0;
             if (!ANY(at.active))
@@ -179,31 +181,30 @@ __attribute__((always_inline)) inline void follow_in_sense(Made *made, const Pat
             clip_to_faces(&from, &to, &sense, crossing.face.near, crossing.face.far, at.r,
                           crossing.r_next, at.depth, crossing.next_depth);
             take_medium(made, &path->ray, from, to, medium, meets);
-            if (LANES > 1 || !frame->one_list)
+            if (LANES > 1 || !lists->frame.one_list)
                 break;
-            crossing.stays = crossing.stays && !are_done(made, frame);
+            crossing.stays = crossing.stays && !are_done(made, lists);
             meets = next_in_list(&at, &crossing, path, &sense, lists);
         }
         // Step on (Amanatides and Woo)
-        step_on(&at, &crossing, path, are_done(made, frame));
+        step_on(&at, &crossing, path, are_done(made, lists));
     }
 }
 
 // Follow rays: of several, first those that go away, and then those that come back.
-inline void follow(Made *made, const Path *path, const Lists *lists, const Grid *grid,
-                   const Frame *frame)
+inline void follow(Made *made, const Path *path, const Lists *lists)
 {
     if (!ANY(path->ray.present))
         return;
-    prefetch_ends(path, lists, frame);
+    prefetch_ends(path, lists);
 #if LANES == 1
-    follow_in_sense(made, path, path->ray.present, path->ray.away, lists, grid, frame);
+    follow_in_sense(made, path, path->ray.present, path->ray.away, lists);
 #else
     const Int away = path->ray.present && path->ray.away;
     const Int back = path->ray.present && !path->ray.away;
     if (ANY(away))
-        follow_in_sense(made, path, away, true, lists, grid, frame);
+        follow_in_sense(made, path, away, true, lists);
     if (ANY(back))
-        follow_in_sense(made, path, back, false, lists, grid, frame);
+        follow_in_sense(made, path, back, false, lists);
 #endif
 }

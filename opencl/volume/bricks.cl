@@ -13,7 +13,7 @@
 #include "volume/march.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
-// Steps of one chunk that both kernels walk along, in the same way.
+// Steps of one chunk.
 typedef struct {
     March march;
     int k, end;
@@ -84,53 +84,28 @@ inline Stretch next_stretch(const Walk *walk, const Classified *of, __global con
     return stretch;
 }
 
-// Which bricks the steps of a chunk lie in, but for those that are transparent: their samples are
-// set to nothing here.
-__kernel void want_bricks(
-    const Classified classified, const RaysOfView view, __global const float *forms,
+// Say which bricks the steps of a chunk lie in, but for those that are transparent, whose samples
+// are set to nothing; or sample the steps that lie in bricks which are on the device.
+__kernel void sample_steps(
+    MEDIUM_PARAMETERS, // voxels: slots of points cubed, each with a brick or not
+    const RaysOfView view, __global const float *forms,
     __global const float
         *opaque_depth,             // t at which each pixel's ray ends, top row first; 0: none does
     __global const uchar *visible, // whether a macrocell holds anything that is not transparent
     const Bricks bricks,
-    __global uint *wanted,    // per brick; set to 1
-    __global float4 *samples) // see volume/rays_of_view.cl; room for `steps` of each ray
-{
-    const uint item = (uint)get_global_id(0);
-    Walk walk;
-    if (!begin_walk(&walk, item, &view, &classified, forms, opaque_depth))
-        return;
-    __global float4 *sample = samples + samples_start(item, view.steps);
-    while (walk.k < walk.end) {
-        const Stretch stretch = next_stretch(&walk, &classified, visible, &bricks);
-        if (stretch.transparent)
-            for (int k = walk.k; k < stretch.end; ++k)
-                sample[(k - view.first_step) * SAMPLE_LANES] = (float4)(0.0f);
-        else
-            wanted[stretch.brick] = 1;
-        walk.k = stretch.end;
-    }
-}
-
-// Sample the steps of a chunk that lie in bricks which are on the device.
-__kernel void sample_steps(
-    const Classified classified,
-    __global const VOXEL_T *voxels, // slots of points cubed, each with a brick or not
-    __global const float4 *table, __global const uchar *distances, __global const uchar *blanked,
-    __global const float *gradient, __global const float *lighting, __global const float *ambient,
-    const RaysOfView view, __global const float *forms, __global const float *opaque_depth,
-    __global const uchar *visible, const Bricks bricks,
     __global const int *slots, // of each brick; negative where its steps are not to be sampled now
-    __global float4 *samples)
+    __global uint *wanted,     // per brick; set to 1; 0: steps are sampled
+    __global float4 *samples)  // see volume/rays_of_view.cl; room for `steps` of each ray
 {
     const uint item = (uint)get_global_id(0);
-    Medium medium = {classified, voxels, table, distances, blanked, gradient, lighting, ambient};
+    Medium medium = MEDIUM_OF_PARAMETERS;
     Walk walk;
     if (!begin_walk(&walk, item, &view, &classified, forms, opaque_depth))
         return;
     __global float4 *sample = samples + samples_start(item, view.steps);
     while (walk.k < walk.end) {
         const Stretch stretch = next_stretch(&walk, &classified, visible, &bricks);
-        const int slot = stretch.transparent ? -1 : slots[stretch.brick];
+        const int slot = stretch.transparent || wanted ? -1 : slots[stretch.brick];
         if (slot >= 0) {
             const int3 first = ((stretch.cell >> bricks.shift) << bricks.shift) - bricks.margin;
             const uint points = (uint)bricks.points;
@@ -141,6 +116,11 @@ __kernel void sample_steps(
             for (int k = walk.k; k < stretch.end; ++k)
                 sample[(k - view.first_step) * SAMPLE_LANES] = step_medium(
                     &walk.march, &medium, step_face(&walk.march, k), step_face(&walk.march, k + 1));
+        } else if (wanted && stretch.transparent) {
+            for (int k = walk.k; k < stretch.end; ++k)
+                sample[(k - view.first_step) * SAMPLE_LANES] = (float4)(0.0f);
+        } else if (wanted) {
+            wanted[stretch.brick] = 1;
         }
         walk.k = stretch.end;
     }

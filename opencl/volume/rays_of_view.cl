@@ -13,10 +13,13 @@ typedef struct {
     float sample_distance, unit_distance; // model units
 } RaysOfView;
 
+// Those from the `first` on; x and y are of the part.
 inline Rays rays_of_view(const RaysOfView *view, uint first)
 {
-    return rays_of_part(first, view->width, view->height, view->first_column, view->columns,
-                        view->first_row, view->rows);
+    Rays rays = rays_at(block_pixel(first, view->columns), view->columns, view->rows);
+    rays.a = offsets_from_middle(view->first_column + rays.x, view->width);
+    rays.b = offsets_from_middle(view->first_row + rays.y, view->height);
+    return rays;
 }
 
 // The samples of steps that are taken before they are composited (volume/bricks.cl), of a volume

@@ -67,23 +67,18 @@ typedef struct {
                // their rows and planes
 } Points;
 
-// Address of the point nearest to a position.
-inline Index nearest_point(const Points *points, Real x, Real y, Real z)
+// A component of the point nearest to a position.
+inline Voxels nearest_component(__global const VOXEL_T *voxels, const Points *points, Real x,
+                                Real y, Real z, int component)
 {
     // What is below 0 is clamped, so that TO_INT rounds down
     const Int i = clamp(TO_INT(x + 0.5f), 0, points->size.x - 1);
     const Int j = clamp(TO_INT(y + 0.5f), 0, points->size.y - 1);
     const Int k = clamp(TO_INT(z + 0.5f), 0, points->size.z - 1);
-    return (TO_INDEX(k) * (INDEX_T)points->held.y + TO_INDEX(j)) * (INDEX_T)points->held.x +
-           TO_INDEX(i) - (INDEX_T)points->held.w;
-}
-
-// A component of that point.
-inline Voxels nearest_component(__global const VOXEL_T *voxels, const Points *points, Real x,
-                                Real y, Real z, int component)
-{
-    return load_voxels(voxels,
-                       nearest_point(points, x, y, z) * (INDEX_T)COMPONENTS + (INDEX_T)component);
+    const Index point =
+        (TO_INDEX(k) * (INDEX_T)points->held.y + TO_INDEX(j)) * (INDEX_T)points->held.x +
+        TO_INDEX(i) - (INDEX_T)points->held.w;
+    return load_voxels(voxels, point * (INDEX_T)COMPONENTS + (INDEX_T)component);
 }
 
 inline Real linear_component(__global const VOXEL_T *voxels, const Points *points, Real x, Real y,

@@ -16,8 +16,9 @@ CELL_ITEMS = CELL * CELL
 
 #: Logarithm to base 2 of the points along each edge of a macrocell (``volume/macrocells.cl``).
 MACROCELL_SHIFT = 3
-#: float32 numbers of a recorded run (``generation/records.cl``).
-RUN_WORDS = 8
+#: float32 numbers of a recorded run (``generation/records.cl``), of a segment of a ray
+#: (``multi_vdi/pool.cl``), and of a form (``lib/rays.cl``).
+RUN_WORDS, SEGMENT_SIZE, FORM_SIZE = 8, 8, 12
 #: Lists whose lengths a work-item sums up (``generation/offsets.cl``).
 LISTS_PER_ITEM = 16
 
@@ -36,10 +37,10 @@ SLABS = 64
 #: Of a frame's forms: (u, v, depth, denominator) and the model direction, before the planes to clip
 #: to (``lib/list_space.cl``).
 PLANE_FORMS = 7
+#: Kinds of the depth coordinate (``lib/list_space.cl``).
+RECIPROCAL, SHIFTED, PARALLEL = range(3)
 #: Pixels across by pixels along a packet, at most: that of the line that it follows.
 STEEPEST = 1.5
-#: float32 numbers of a segment of a ray, and slots that a ray has to spare (``multi_vdi/pool.cl``).
-SEGMENT_SIZE, SPARE_SLOTS = 6, 2
 
 
 def definitions() -> list[str]:
@@ -61,19 +62,18 @@ def literal(value: object) -> str:
 
 #: Work-items per group: four blocks.
 GROUP = 64
-#: Pixels along the edges of a block.
-_BLOCK = 4
-#: Rays of a block, which kernels written out in vectors follow in one work-item.
-BLOCK_RAYS = _BLOCK * _BLOCK
+#: Pixels along the edges of a block, whose rays kernels in vectors follow in one work-item.
+BLOCK = 4
+BLOCK_RAYS = BLOCK * BLOCK
 
 
 def part_columns(part: Rectangle) -> NDArray[np.int32]:
-    """Return the columns of strips that cover part of a window, as ``part_pixel`` takes them.
+    """Return the columns of strips that cover part of a window, as ``rays_of_strips`` takes them.
 
     First column, first strip, columns of each strip, strips: int32 (4,). Each column is a group.
     """
-    column, strip = part.x0 // _BLOCK, part.y0 // (_BLOCK * STRIP)
-    columns, strips = -(-part.x1 // _BLOCK) - column, -(-part.y1 // (_BLOCK * STRIP)) - strip
+    column, strip = part.x0 // BLOCK, part.y0 // (BLOCK * STRIP)
+    columns, strips = -(-part.x1 // BLOCK) - column, -(-part.y1 // (BLOCK * STRIP)) - strip
     return np.array([column, strip, columns, strips], np.int32)
 
 

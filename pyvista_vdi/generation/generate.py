@@ -52,7 +52,7 @@ def generate_vdi(request: GenerationRequest) -> VDI:
         for part in slices:
             records.begin(part)
             # Sample the rays' steps, merge what is alike, and make room in records that are full
-            for chunk in march.chunks:
+            for chunk in march.chunks(part):
                 march.advance(chunk)
                 records.make_room(last=chunk.last)
             # Fit each record to the budget

@@ -1,10 +1,13 @@
 """Records of a slice's rays: marched and merged, fitted to the budget, and packed."""
 
+from collections.abc import Mapping
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from pyvista_vdi.device import DeviceBuffer, Runtime
 from pyvista_vdi.device.constants import GROUP, RUN_WORDS, block_items
@@ -12,7 +15,7 @@ from pyvista_vdi.generation.list_arrays import GrowingLists
 from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.model.ray_forms import Rectangle, check_list_space
+from pyvista_vdi.model.ray_forms import Floats, Rectangle, check_list_space
 from pyvista_vdi.volume.bricks import StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import GridRays, RayLaunch
@@ -70,13 +73,12 @@ class Records(AbstractContextManager["Records"]):
             self.thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
             self.counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))
             self._buffers = stack.pop_all()
-        self.defines = {"DOUBLE_FLOAT_RAYS": march.double_float}
         records: dict[str, Any] = {"forms": self.forms, "records": self.runs}
         self._shorten = RayLaunch(
             runtime,
             "generation/shorten_lists.cl",
             "shorten_lists",
-            self.defines,
+            {},
             **records,
             thresholds=self.thresholds,
             errors=self.errors,
@@ -84,18 +86,15 @@ class Records(AbstractContextManager["Records"]):
         )
         self._cut = None
         if options.criterion == "homogeneity":
-            records["counts"] = self.counts
             self._cut = runtime.bind(
                 "generation/homogeneity.cl",
                 "cut_lists",
-                self.defines,
                 **records,
+                counts=self.counts,
                 recording=self._budget,
             )
-            del records["counts"]
-        self._pack = runtime.bind(
-            "generation/pack_lists.cl", "pack_lists", self.defines, **records, capacity=capacity
-        )
+        records |= {"double_float": march.double_float, "capacity": capacity}
+        self._pack = runtime.bind("generation/pack_lists.cl", "pack_lists", **records)
 
     def __exit__(self, *_: object) -> None:
         self._buffers.close()
@@ -137,6 +136,10 @@ class Records(AbstractContextManager["Records"]):
 _FIRST_CHUNK_STEPS = 64
 
 
+#: Tiles across a window, and at least as many up it, in each of which the longest ray is found.
+_TILES = 16
+
+
 class Chunk(NamedTuple):
     """Steps that all rays of a slice march before their records are looked at."""
 
@@ -146,7 +149,7 @@ class Chunk(NamedTuple):
 
 
 class March(AbstractContextManager["March"]):
-    """Marches the rays of slices, one of the ``chunks`` of steps at a time.
+    """Marches the rays of slices, a chunk of steps at a time.
 
     ``entering``: the light that enters part of a grid along each ray of the window, 0 to 1.
     """
@@ -158,14 +161,14 @@ class March(AbstractContextManager["March"]):
         camera: Camera,
         entering: DeviceBuffer | None = None,
     ) -> None:
-        self._records = records
-        self.chunks = self._chunks(medium)
+        self._records, self._most_steps = records, medium.most_steps
         runtime, arguments = records.runtime, medium.medium_arguments(camera)
         # Opacity is summed up from 0 in every run
         compensated = 2 if medium.variant.compensated > 1 else 0
         variant = replace(
             medium.variant, double_float=records.march.double_float, compensated=compensated
         )
+        self._longest = self._longest_rays(arguments["classified"], medium.sample_distance)
         with ExitStack() as stack:
             self._sampler = None
             if medium.bricks is not None:
@@ -194,22 +197,11 @@ class March(AbstractContextManager["March"]):
     def __exit__(self, *_: object) -> None:
         self._buffers.close()
 
-    def _chunks(self, medium: DeviceVolume) -> list[Chunk]:
-        """Return the chunks that reach the end of any ray."""
-        (x0, x1, y0, y1), (width, height) = self._records.window, self._records.size
-        corners = [(1, x - width / 2, y - height / 2) for x in (x0, x1) for y in (y0, y1)]
-        forms = np.reshape(self._records.march.forms[:6], (2, 3, 2, 3))
-        slopes, directions = forms[:, :, 1] @ np.transpose(corners)
-        # Rays through an axis' first and last points are the longer the more they lean: most at a
-        # corner, unless some of them do not move along it. A voxel, a hundredth and two steps more
-        # are for what float32 rounds
-        with np.errstate(divide="ignore"):
-            lean = (np.linalg.norm(directions, axis=0) / np.abs(slopes)).max(axis=1)
-        lean[np.abs(np.sign(slopes).sum(axis=1)) < len(corners)] = np.inf
-        longest = 1.01 * (lean * medium.volume.dimensions).min() / medium.sample_distance + 2
+    def chunks(self, part: Slice) -> list[Chunk]:
+        """Return the chunks that reach the end of a slice's longest ray."""
         found: list[Chunk] = []
-        first, steps, most = 0, _FIRST_CHUNK_STEPS, medium.most_steps
-        while first < min(most, longest):
+        first, steps, most = 0, _FIRST_CHUNK_STEPS, self._most_steps
+        while first < min(most, self._longest[part.number]):
             found.append(Chunk(first, steps, first + steps >= most))
             first, steps = first + steps, CHUNK_STEPS
         return found
@@ -221,3 +213,29 @@ class March(AbstractContextManager["March"]):
         if self._sampler is not None:
             self._sampler.sample(records.view)
         self._launch(records.items, view=records.view)
+
+    def _longest_rays(self, classified: Mapping[str, Any], sample_distance: float) -> Floats:
+        """Return the most steps of the rays of each slice: chunks behind them have nothing.
+
+        The window is cut into tiles. In one of them a ray comes to a face of the volume no earlier
+        or later than at the corners, unless some of the tile's rays do not move towards it.
+        """
+        records = self._records
+        (x0, x1, y0, y1), (width, height) = records.window, records.size
+        slices, rows = len(records.slices), records.slices.rows
+        high = -(-_TILES // slices)  # tiles in a slice
+        y = np.minimum(y0 + np.arange(slices * high + 1) * rows / high, y1) - height / 2
+        b, a = np.meshgrid(y, np.linspace(x0, x1, _TILES + 1) - width / 2, indexing="ij")
+        forms = np.reshape(records.march.forms[:6], (2, 3, 2, 3))
+        at = np.tensordot(forms, [np.ones_like(a), a, b], 1)
+        start, slope, speed = at[0, :, 0], at[0, :, 1], np.linalg.norm(at[1, :, 1], axis=0)
+        first, size = (np.reshape(classified[of][:3], (3, 1, 1)) for of in ("part_first", "size"))
+        corners, over = partial(sliding_window_view, window_shape=(2, 2), axis=(-2, -1)), (-2, -1)
+        # A voxel on either side is for what float32 rounds, as are a thousandth and two steps more
+        with np.errstate(all="ignore"):
+            faces = np.sort([(first - 1 - start) / slope, (first + size - start) / slope], axis=0)
+            moves = corners(slope).min(over) * corners(slope).max(over) > 0
+            near = np.where(moves, corners(faces[0]).min(over), -np.inf).max(axis=0)
+            far = np.where(moves, corners(faces[1]).max(over), np.inf).min(axis=0)
+            steps = 1.001 * (far - near) * corners(speed).max(over) / sample_distance + 2
+        return steps.reshape(slices, -1).max(axis=1)

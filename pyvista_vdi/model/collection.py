@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pyvista_vdi import registry
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.vdi import VDI
+from pyvista_vdi.model.vdi import VDI, Lists
 
 #: Steps per second at which those of several times are played.
 RATE = 24.0
@@ -67,13 +67,6 @@ class VDICollection(Sequence[VDI]):
         a series what its first step's take. Pages have ``title`` and ``background`` as well, and
         those of a series ``autoplay``.
         """
-        method = registry.method(f"{type(self).__name__}.save")
-        return method(self, path, **options)  # type: ignore[no-any-return]
+        return registry.method("VDICollection.save")(self, path, **options)  # type: ignore[no-any-return]
 
-    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
-        """Return what a notebook shows: a viewer, or a picture."""
-        text = {"text/plain": repr(self)}
-        if self.value_range is not None:  # pages show colours
-            return text
-        name = f"{type(self).__name__}._repr_mimebundle_"
-        return registry.method(name, lambda *_: text)(self, include, exclude)
+    _repr_mimebundle_ = Lists._repr_mimebundle_

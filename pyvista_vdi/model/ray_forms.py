@@ -216,10 +216,10 @@ def direction_forms(
     return [*forms]
 
 
-def packed(forms: Sequence[Floats], double_float: int = 0) -> NDArray[np.float32]:
-    """Return forms as the kernels read them, float32 (n, 6); refuse what float32 cannot hold.
+def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
+    """Return forms as the kernels read them, float32 (n, 12); refuse what float32 cannot hold.
 
-    As double-floats with what that rounds off them, float32 (n, 12): see ``lib/rays.cl``.
+    Behind the six numbers of a form stands what float32 rounds off them: see ``lib/rays.cl``.
     """
     with np.errstate(over="ignore"):
         table = np.asarray(forms, dtype=np.float32)
@@ -228,8 +228,6 @@ def packed(forms: Sequence[Floats], double_float: int = 0) -> NDArray[np.float32
             "the view cannot be expressed in float32: positions or distances exceed 1e38 model "
             "units; scale the data and the camera"
         )
-    if not double_float:
-        return table
     return np.hstack([table, np.subtract(forms, table, dtype=np.float64).astype(np.float32)])
 
 

@@ -36,17 +36,12 @@ _UNITS = 2.0**40
 
 
 class Lists:
-    """A view, and sorted lists of disjoint supersegments along its rays."""
+    """A view, and sorted lists of disjoint supersegments along its rays: see :class:`VDI`."""
 
-    #: The generating view V_O.
     camera: Camera
-    #: Lists along each edge of the viewport.
     window_size: tuple[int, int]
-    #: Axis-aligned bounds in the model frame.
     bounds: tuple[float, float, float, float, float, float]
-    #: World units, added to every front and back.
     depth_origin: float
-    #: How it was made.
     metadata: dict[str, Any]
     #: The lists in the form of a VDI: of a VDI itself.
     lists: VDI

@@ -42,7 +42,7 @@ _FRAMES = 2
 #: Options that are chosen, or left no room for.
 _CHOSEN = ("max_supersegments", "tolerance", "precision")
 #: Bytes on a device in the 8-byte form; a list that is not empty has a header.
-_LIST_BYTES, _SUPERSEGMENT_BYTES, _HEADER_BYTES = 4, 8, 16
+_LIST_BYTES, _SUPERSEGMENT_BYTES, _HEADER_BYTES = 8, 8, 16
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ def choose(device: Runtime, scene: Scene) -> ChosenKernel:
     The reasons are in docs/decisions/index.md.
     """
     prepared, options = scene.prepared, scene.options
-    lists = prepared.switches  # OFFSET_T, DEPTH, PACKED; DOUBLE_FLOAT_RAYS where it is needed
+    lists = prepared.switches  # OFFSET_T, PACKED; DOUBLE_FLOAT_RAYS where it is needed
     compensated = summation(options.preview_samples or prepared.most_media)
     sums: dict[str, int | str] = {"COMPENSATED": compensated}
     double_float, cropped = prepared.double_float, scene.regions != 0

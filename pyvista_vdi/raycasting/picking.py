@@ -86,7 +86,12 @@ class FirstHit(NamedTuple):
     @classmethod
     def of(cls, opacity_threshold: float, accumulated: bool) -> FirstHit:
         """Return it for an opacity, which is checked."""
-        threshold = checked_opacity(opacity_threshold)
+        threshold = as_float(opacity_threshold)
+        if not 0 <= threshold < 1:
+            raise InvalidArgumentError(
+                "opacity_threshold must be at least 0 and less than 1, which no medium reaches; "
+                f"got {opacity_threshold!r}"
+            )
         return cls(-math.log1p(-threshold), as_flag(accumulated, "accumulated"))
 
     def first(self, optical_depths: Floats) -> int | None:
@@ -94,17 +99,6 @@ class FirstHit(NamedTuple):
         met = np.cumsum(optical_depths) if self.accumulated else optical_depths
         reached = (met > 0) & (met >= self.optical_depth)
         return int(np.argmax(reached)) if reached.any() else None
-
-
-def checked_opacity(opacity_threshold: float) -> float:
-    """Return an opacity threshold as a float, at least 0 and less than 1."""
-    threshold = as_float(opacity_threshold)
-    if not 0 <= threshold < 1:
-        raise InvalidArgumentError(
-            "opacity_threshold must be at least 0 and less than 1, which no medium reaches; "
-            f"got {opacity_threshold!r}"
-        )
-    return threshold
 
 
 def pick_vdi(

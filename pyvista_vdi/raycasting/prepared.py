@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together, padded
+from pyvista_vdi.device import DeviceBuffer, Runtime, constants, kept_together, padded
 from pyvista_vdi.device.constants import BUNDLE, GROUP, LIST_HEADER, LISTS_PER_ITEM, SLABS, STACK
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
@@ -50,6 +50,9 @@ _NO_MEDIA = dict.fromkeys(
     ("colors", "optical_depths", "means", "spreads", "steps", "integrals"), None
 ) | {"cells": 0}
 
+#: Keeps a buffer until all are made (:func:`pyvista_vdi.device.kept_together`), and returns it.
+Keep = Callable[[DeviceBuffer], DeviceBuffer]
+
 
 class OccupancyGrid:
     """How many supersegments reach into each cell: stacks of 64 slabs over 16 x 16 lists.
@@ -67,13 +70,12 @@ class OccupancyGrid:
     counts: DeviceBuffer
     masks: DeviceBuffer
 
-    def __init__(self, prepared: "PreparedVDI", count: Callable[..., None]) -> None:
+    def __init__(self, prepared: "PreparedVDI", count: Callable[..., None], keep: Keep) -> None:
         runtime, origin = prepared.runtime, prepared.depth_origin
         width, height = prepared.window
         wide, high = self.stacks = (-(-width // STACK), -(-height // STACK))
         near, far = prepared.depths
-        if not prepared.parallel:
-            near = max(near, prepared.nearest)
+        near = max(near, prepared.nearest)
         #: Where slab 0 begins, view depth less the VDI's depth origin; slabs per world unit.
         self.first_depth = near - origin
         # Bounds without depth, or behind the eye: everything is in slab 0
@@ -90,29 +92,28 @@ class OccupancyGrid:
         #: By which supersegments count beyond their faces, world units: more than the raycaster's
         #: depths are rounded by.
         self.margin = _ROUNDINGS * 2.0**-23 * looked_up
-        with kept_together() as keep:
-            self.counts = keep(runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts"))
-            self.masks = keep(runtime.buffer((high, wide), np.uint64, "occupancy masks"))
-            # Count, and sum up by stacks
-            grid = {
-                "width": width,
-                "height": height,
-                "stacks_wide": wide,
-                "first_depth": self.first_depth,
-                "slabs_per_depth": self.slabs_per_depth,
-                "margin": self.margin,
-            }
-            runtime.fill(self.counts, np.uint32(0))
-            count(grid=grid, changes=self.counts)
-            occupied = runtime.bind(
-                "raycasting/occupancy.cl",
-                "occupied_slabs",
-                counts=self.counts,
-                stacks=wide * high,
-                masks=self.masks,
-            )
-            occupied(padded(wide * high, GROUP), GROUP)
-            masks = runtime.download(self.masks)
+        self.counts = keep(runtime.buffer((high, wide, SLABS), np.uint32, "occupancy counts"))
+        self.masks = keep(runtime.buffer((high, wide), np.uint64, "occupancy masks"))
+        # Count, and sum up by stacks
+        grid = {
+            "width": width,
+            "height": height,
+            "stacks_wide": wide,
+            "first_depth": self.first_depth,
+            "slabs_per_depth": self.slabs_per_depth,
+            "margin": self.margin,
+        }
+        runtime.fill(self.counts, np.uint32(0))
+        count(grid=grid, changes=self.counts)
+        occupied = runtime.bind(
+            "raycasting/occupancy.cl",
+            "occupied_slabs",
+            counts=self.counts,
+            stacks=wide * high,
+            masks=self.masks,
+        )
+        occupied(padded(wide * high, GROUP), GROUP)
+        masks = runtime.download(self.masks)
         pixel_rays = rays.pixel_rays(prepared.camera, prepared.window, prepared.bounds)
         #: Model points, (n, 3), whose convex hull holds all occupied cells that rays meet, and a
         #: list and a slab around them.
@@ -208,7 +209,7 @@ class PreparedVDI:
         rays.check_list_space(vdi.camera, vdi.bounds)
         #: View depths of the bounds, and the least that is in front of V_O's eye, world units.
         self.depths = near, far = rays.depth_range(vdi.camera, vdi.bounds)
-        self.nearest = rays.nearest_depth(vdi.camera, vdi.bounds)
+        self.nearest = rays.nearest_depth(vdi.camera, vdi.bounds) if not self.parallel else -np.inf
         # An origin much closer than the data costs the coordinate the digits that it is to save
         closest = min(near, self.depth_origin)
         #: Whether the depth coordinate is that of a long lens.
@@ -243,7 +244,7 @@ class PreparedVDI:
             coordinate = np.array([0.0, 0.0, 0.0, -1.0])  # -1 / Z
         return np.stack([half[0] * u, half[1] * v, coordinate, denominator])
 
-    def _prepare(self, vdi: VDI, keep: Callable[[DeviceBuffer], DeviceBuffer]) -> None:
+    def _prepare(self, vdi: VDI, keep: Keep) -> None:
         """Bring the lists to the device, exact or packed, and build the occupancy grid."""
         runtime, packing = self.runtime, vdi.packing
         with contextlib.ExitStack() as stack:
@@ -259,12 +260,12 @@ class PreparedVDI:
                     held[name] = upload(getattr(packing, name), f"{name} of 8-byte supersegments")
                 held |= {"starts": upload(vdi.offsets, "list offsets"), "step": packing.step}
                 # Each list has a header, and words before its supersegments
-                lengths = np.where(vdi.counts > 0, vdi.counts + LIST_HEADER, 0)
-                begins = np.concatenate([[0], np.cumsum(lengths)])
-                self._tell_sizes(int(begins[-1]), int(vdi.counts.max(initial=0)))
-                headers = begins.astype(np.int64 if self.long_offsets else np.int32)
+                counts = vdi.counts.ravel()
+                behind = np.cumsum(counts + LIST_HEADER * (counts > 0))
+                self._tell_sizes(int(behind[-1]), int(counts.max()))
+                headers = (behind - counts | counts << constants.FIRST_BITS).astype(np.uint64)
                 self.headers = keep(runtime.upload(headers, "list headers"))
-                occupied = np.flatnonzero(vdi.counts)
+                occupied = np.flatnonzero(counts)
                 first = packing.codes(offsets[occupied])[0]
                 last = packing.codes(offsets[occupied + 1] - 1)[1]
                 ends = np.stack([packing.depths(occupied, each) for each in (first, last)], axis=1)
@@ -275,52 +276,44 @@ class PreparedVDI:
                 if not held:
                     arrays: Any = zip(_ARRAYS.items(), vdi.arrays, strict=True)
                     held = {name: upload(array, what) for (name, what), array in arrays}
-                ends = self._place_bundles(held, keep)
+                begins, ends = self._place_bundles(held, stack.enter_context)
             self._tell_double_float(ends)
 
             if packing is None:
-                self._prepare_lists(held, self.headers, keep)
+                self._prepare_lists(held, begins, keep)
             else:
                 self._prepare_packed(held, keep)
         if runtime.is_cpu:
             self.lit = share_lit(vdi, *self.depths)
 
-    def _prepare_packed(
-        self, held: dict[str, Any], keep: Callable[[DeviceBuffer], DeviceBuffer]
-    ) -> None:
+    def _prepare_packed(self, held: dict[str, Any], keep: Keep) -> None:
         """Prepare lists of 8-byte supersegments behind their scales, and count them."""
-        runtime, (width, height) = self.runtime, self.window
-        per_list = padded(width * height, GROUP)
-
-        def count(**grid: Any) -> None:
-            counting = runtime.bind("raycasting/occupancy.cl", "count_packed", **held)
-            counting(per_list, GROUP, **grid)
-
-        self.occupancy = OccupancyGrid(self, count)
-        keep(self.occupancy.counts), keep(self.occupancy.masks)
+        runtime, lists = self.runtime, self.window[0] * self.window[1]
         self.faces = self.media = keep(
             runtime.result((max(1, self._entries), 2), np.uint32, "supersegments")
         )
-        stored = {"stored" if name == "words" else name: each for name, each in held.items()}
-        window = {"width": width, "height": height, "centre_ray": self._centre}
-        written = {"headers": self.headers, "words": self.faces}
         prepare = runtime.bind(
-            *("raycasting/prepare.cl", "prepare_packed", self.switches),
-            **{**stored, **window, **written},
+            "raycasting/prepare.cl",
+            "prepare_packed",
+            **held,
+            centre_ray=self._centre,
+            headers=self.headers,
+            faces=self.faces,
         )
-        prepare(per_list, GROUP)
+        self.occupancy = OccupancyGrid(self, partial(prepare, padded(lists, GROUP), GROUP), keep)
 
     def _prepare_lists(
         self,
         arrays: dict[str, Any],
-        places: DeviceBuffer,
-        keep: Callable[[DeviceBuffer], DeviceBuffer],
+        begins: DeviceBuffer,
+        keep: Keep,
     ) -> None:
         """Prepare exact lists, and count them in the occupancy grid.
 
-        ``places``: headers of the bundles with all supersegments that ``arrays`` have.
+        ``begins``: where bundles begin that have all supersegments of ``arrays``.
         """
-        runtime, bundles = self.runtime, self.headers.shape[0]
+        runtime, bundles = self.runtime, begins.shape[0] - 1
+        self.headers = keep(runtime.result((bundles,), np.uint64, "list headers"))
         # A CPU writes them in our own memory, which systems give in large pages, a driver's in
         # small ones
         self.faces = keep(runtime.result((self._entries, 2), name="supersegment faces"))
@@ -328,29 +321,24 @@ class PreparedVDI:
         prepare = runtime.bind(
             "raycasting/prepare.cl",
             "prepare_lists",
-            self.switches,
             **{**_NO_MEDIA, **arrays},
-            places=places,
+            begins=begins,
             centre_ray=self._centre,
+            depth_kind=constants.PARALLEL if self.double_float else self.depth_kind,
             depth_origin=self.depth_origin,
             nearest=self.nearest,
             headers=self.headers,
             faces=self.faces,
             media=self.media,
         )
-
-        def count(**grid: Any) -> None:
-            prepare(padded(bundles, GROUP), GROUP, **grid)
-
-        self.occupancy = OccupancyGrid(self, count)
-        keep(self.occupancy.counts), keep(self.occupancy.masks)
+        self.occupancy = OccupancyGrid(self, partial(prepare, padded(bundles, GROUP), GROUP), keep)
 
     def _place_bundles(
-        self, held: Mapping[str, Any], keep: Callable[[DeviceBuffer], DeviceBuffer]
-    ) -> NDArray[np.float32]:
+        self, held: Mapping[str, Any], keep: Keep
+    ) -> tuple[DeviceBuffer, NDArray[np.float32]]:
         """Find where bundles begin, on the device; nothing is uploaded.
 
-        Returns the first front and the last back of the lists that are not empty, (n, 2).
+        Returns that, and the first front and the last back of the lists that are not empty, (n, 2).
         """
         runtime, (width, height) = self.runtime, self.window
         bundles = -(-width // BUNDLE) * -(-height // BUNDLE)
@@ -359,9 +347,9 @@ class PreparedVDI:
             runtime.buffer((bundles,), np.uint32, "lengths of bundles") as lengths,
             runtime.buffer((1,), np.uint32, "longest list") as longest,
             runtime.buffer((blocks,), np.uint64, "sums of lengths") as sums,
-            runtime.buffer((bundles + 1,), np.uint64, "where bundles begin") as begins,
             runtime.result((width * height, 2), name="ends of lists") as ends,
         ):
+            begins = keep(runtime.buffer((bundles + 1,), np.uint64, "where bundles begin"))
             for buffer, value in ((longest, 0), (begins, 0), (ends, np.nan)):
                 runtime.fill(buffer, value)
             occupancy, offsets = "raycasting/occupancy.cl", "generation/offsets.cl"
@@ -373,14 +361,11 @@ class PreparedVDI:
             runtime.bind(offsets, "sum_lengths", **add)(blocks * GROUP, group)
             place = runtime.bind(offsets, "list_offsets", **add, made=0, all_offsets=begins)
             place(blocks * GROUP, group)
-            self.headers = keep(runtime.result((bundles,), np.uint64, "list headers"))
-            write = runtime.bind(occupancy, "bundle_headers", begins=begins, bundles=bundles)
-            write(items, group, headers=self.headers)
             entries = np.zeros(1, np.uint64)
             runtime.download_later(begins, entries, first=bundles)()
             self._tell_sizes(int(entries[0]), int(runtime.download(longest)[0]))
             found = runtime.download(ends)
-            return found[~np.isnan(found[:, 0])]
+            return begins, found[~np.isnan(found[:, 0])]
 
     def _tell_sizes(self, entries: int, longest: int) -> None:
         """Set what follows from the entries of all lists, and the length of the longest."""
@@ -404,14 +389,17 @@ class PreparedVDI:
         self.double_float = 0
         if lists_are_far(rounded.max(initial=0.0), thickness, far - near):
             self.double_float = 2 if back.max() - near < far - front.min() else 1
+        #: Which depth coordinate faces have, see ``lib/list_space.cl``.
+        self.depth_kind = constants.RECIPROCAL
+        if self.parallel or (self.shifted and not self.double_float):
+            self.depth_kind = constants.PARALLEL if self.parallel else constants.SHIFTED
         #: ``-D`` names of kernels that read the lists, and their values.
         self.switches: dict[str, int | str] = {
             "OFFSET_T": "long" if self.long_offsets else "int",
-            "DEPTH": "PARALLEL" if self.parallel else "SHIFTED" if self.shifted else "RECIPROCAL",
             "PACKED": int(self.packed),
         }
         if self.double_float:
-            self.switches["DOUBLE_FLOAT_RAYS"] = self.double_float
+            self.switches["DOUBLE_FLOAT_RAYS"] = 1
         self.list_rows = self.list_space(self.camera)
 
 
@@ -429,27 +417,27 @@ class KeptValues(PreparedVDI):
             }
             super().__init__(runtime, self._lists)
 
-    def _prepare(self, vdi: VDI, keep: Callable[[DeviceBuffer], DeviceBuffer]) -> None:
+    def _prepare(self, vdi: VDI, keep: Keep) -> None:
         """Bring offsets and faces to the device."""
         arrays: Any = vdi.arrays
         self._faces = {
             name: keep(self.runtime.upload(array, _ARRAYS[name]))
             for name, array in zip(_COUNTED, arrays, strict=False)
         }
-        self._tell_double_float(self._place_bundles(self._faces, keep))
+        self._begins, ends = self._place_bundles(self._faces, keep)
+        self._tell_double_float(ends)
 
     def shown(self, look: ValuesLook) -> PreparedVDI:
         """Return what a transfer function shows: what is transparent is left out."""
-        runtime, shown, bundles = self.runtime, copy.copy(self), self.headers.shape[0]
+        runtime, shown = self.runtime, copy.copy(self)
         if runtime.is_cpu:
             shown.lit = share_lit(self._lists, *self.depths, partial(look.media_of, look))
         with (
             kept_together() as keep,
             runtime.upload(look.integrals, "integrals of a transfer function") as table,
         ):
-            shown.headers = keep(runtime.result((bundles,), np.uint64, "list headers"))
             media = {**self.values, "integrals": table, "cells": CELLS}
-            shown._prepare_lists({**self._faces, **media}, self.headers, keep)
+            shown._prepare_lists({**self._faces, **media}, self._begins, keep)
         return shown
 
 

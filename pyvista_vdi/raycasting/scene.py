@@ -97,8 +97,8 @@ class Scene:
     camera: Camera
     size: tuple[int, int]
     options: RenderOptions
-    #: List coordinates, model direction and the planes to clip to, (n, 6), or (n, 12) as
-    #: double-floats; how many of them are planes, of which the first six are the bounds.
+    #: List coordinates, model direction and the planes to clip to, (n, 12); how many of them are
+    #: planes, of which the first six are the bounds.
     forms: NDArray[np.float32]
     planes: int
     #: t at which each ray ends, (H, W), top row first; None if nothing opaque ends them.
@@ -143,7 +143,7 @@ class Scene:
             camera,
             size,
             options,
-            rays.packed(forms, prepared.double_float),
+            rays.packed(forms),
             len(planes),
             rays.checked_opaque_depth(request.opaque_depth, size, pixel_rays),
             pixel_rays.reference_depth,
@@ -180,7 +180,7 @@ class Scene:
         return aligned_view(
             self.size,
             prepared.window,
-            self.forms[:_COORDINATE_FORMS].astype(np.float64),
+            self.forms[:_COORDINATE_FORMS, :6].astype(np.float64),
             (near - self.reference_depth, far - self.reference_depth),
             parallel=prepared.parallel,
             in_bundles=not prepared.packed,
@@ -189,7 +189,7 @@ class Scene:
     @property
     def packets(self) -> Packets | None:
         """How the rays are dealt to packets; None if another kernel is faster."""
-        forms = self.forms.astype(np.float64)
+        forms = self.forms[:, :6].astype(np.float64)
         return packets_of(
             self.prepared.camera,
             self.camera,
@@ -228,6 +228,8 @@ class Scene:
                 "width": self.size[0],
                 "height": self.size[1],
                 "planes": self.planes,
+                "depth_kind": prepared.depth_kind,
+                "lists_near": prepared.double_float == 2,
                 "depth_origin": prepared.depth_origin,
                 "cutoff": -math.log(cutoff) if self.segments else cutoff,
                 "first_depth": occupancy.first_depth,

@@ -9,6 +9,7 @@ import itertools
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +22,7 @@ from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.volume.rays import Variant
 
 #: Logarithms to base 2 of the cells along a brick's edge: large ones copy fewer points twice.
-_SHIFTS = (6, 5, 4)
+SHIFTS = (6, 5, 4)
 #: Bricks that should be on a device at once: a slice of rays then finds most where it left them.
 _ENOUGH_SLOTS = 64
 #: Points before and behind a brick's cells that samples in them read, and that gradients read.
@@ -123,7 +124,7 @@ def fitting_layout(
     Bricks and their tables may take ``nbytes``, and one buffer ``largest``.
     """
     best = None
-    for shift in _SHIFTS:
+    for shift in SHIFTS:
         layout = BrickLayout.of(dimensions, shift, gradients, point_bytes)
         room = min(nbytes - layout.table_bytes, largest)
         slots = min(room // layout.brick_bytes, layout.n_bricks)
@@ -134,13 +135,7 @@ def fitting_layout(
     return best
 
 
-def least_brick_bytes(dimensions: Sequence[int], point_bytes: int, gradients: bool) -> int:
-    """Return what one brick of the smallest kind and its tables take, bytes."""
-    layout = BrickLayout.of(dimensions, _SHIFTS[-1], gradients, point_bytes)
-    return layout.brick_bytes + layout.table_bytes
-
-
-class DeviceBricks:
+class DeviceBricks(AbstractContextManager["DeviceBricks"]):
     """The bricks of a volume that are on a device.
 
     Parameters are the voxels, read as they are needed; what turns part of them into what kernels
@@ -178,9 +173,6 @@ class DeviceBricks:
             self.pool = keep(pool)
             self.slots = keep(runtime.buffer((layout.n_bricks,), np.int32, "slots of bricks"))
             self._wanted = keep(runtime.buffer((layout.n_bricks,), np.uint32, "wanted bricks"))
-
-    def __enter__(self) -> "DeviceBricks":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._runtime.finish()
@@ -229,7 +221,7 @@ class DeviceBricks:
         self.copied += 1
 
 
-class StepSampler:
+class StepSampler(AbstractContextManager["StepSampler"]):
     """Samples the steps of rays in a volume that is on the device brick by brick.
 
     ``medium``: arguments ``MEDIUM_PARAMETERS``; ``variant``: what kernels are compiled for;
@@ -253,15 +245,9 @@ class StepSampler:
         rays: dict[str, Any] = {"forms": forms, "opaque_depth": ends, "visible": bricks.visible}
         rays |= {"bricks": bricks.layout.numbers, "samples": self.samples}
         defines = replace(variant, index="uint").defines  # of a brick's points
-        self._want = runtime.bind(
-            "volume/bricks.cl", "want_bricks", defines, classified=medium["classified"], **rays
-        )
-        self._take = runtime.bind(
+        self._launch = runtime.bind(
             "volume/bricks.cl", "sample_steps", defines, **medium, slots=bricks.slots, **rays
         )
-
-    def __enter__(self) -> "StepSampler":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._runtime.finish()
@@ -271,10 +257,10 @@ class StepSampler:
         """Sample steps of rays, as their numbers (``RaysOfView``) say."""
         items = block_items(view["columns"], view["rows"])
         wanted = self._bricks.wanted(
-            lambda table: self._want(items, GROUP, view=view, wanted=table)
+            lambda table: self._launch(items, GROUP, view=view, wanted=table)
         )
         for _ in self._bricks.rounds(wanted):
-            self._take(items, GROUP, view=view)
+            self._launch(items, GROUP, view=view, wanted=None)
 
 
 def in_parts(

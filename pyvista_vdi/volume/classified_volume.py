@@ -12,15 +12,16 @@ from pyvista_vdi.device.constants import GROUP
 from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.float32_limits import held_unit_distance, summation
+from pyvista_vdi.model.float32_limits import LARGEST_POWER, held_unit_distance, summation
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.bricks import (
+    SHIFTS,
+    BrickLayout,
     DeviceBricks,
     Room,
     fitting_layout,
-    least_brick_bytes,
     too_small,
 )
 from pyvista_vdi.volume.occlusion_grid import ambient_transmittances
@@ -38,7 +39,6 @@ from pyvista_vdi.volume.upload import (
     lighting_table,
     macrocells_over,
     other_bytes,
-    shading_variant,
     uploads_of,
     voxel_reader,
 )
@@ -62,12 +62,13 @@ class DeviceVolume:
     grid's rays, and take the steps that belong to the part. A volume for which ``room`` is too
     little is held brick by brick; without it in one piece or refused.
 
-    Rays are marched through ``grid``, the volume or what it is a part of. ``bricks`` are on the
-    device where the whole volume is not: steps must be sampled by a
-    :class:`~pyvista_vdi.volume.bricks.StepSampler` before kernels march along them. Kernels are
-    compiled for ``variant``, but for what belongs to a view. ``zero`` is the scalar of a voxel that
-    is 0 on the device, ``unit`` scalars per unit of the device's voxels. InvalidArgumentError if
-    the sample distance is no positive length, DeviceMemoryError if something does not fit.
+    ``rays`` are marched through ``grid``, the volume or what it is a part of, by ``most_steps``,
+    those of the longest. ``bricks`` are on the device where the whole volume is not: steps must be
+    sampled by a :class:`~pyvista_vdi.volume.bricks.StepSampler` before kernels march along them.
+    Kernels are compiled for ``variant``, but for what belongs to a view. ``zero`` is the scalar of
+    a voxel that is 0 on the device, ``unit`` scalars per unit of the device's voxels.
+    InvalidArgumentError if the sample distance is no positive length, DeviceMemoryError if
+    something does not fit.
     """
 
     def __init__(
@@ -96,6 +97,9 @@ class DeviceVolume:
         self.unit_distance = held_unit_distance(
             transfer_function.unit_distance or self.grid.default_unit_distance, self.sample_distance
         )
+        self.rays = GridRays(self.grid, self.sample_distance, self.unit_distance)
+        media = self.grid.length / self.sample_distance
+        self.most_steps = math.ceil(media) + 1
         longer = len(transfer_function.opacities) * ENTRY_BYTES - TABLE_BYTES // 10
         if room is not None and longer > 0:
             room = replace(room, working=room.working + longer)
@@ -115,14 +119,14 @@ class DeviceVolume:
         if transfer_function.gradient_opacities is not None:
             values = gradient_table(volume.spacing, scalars(), transfer_function, self.unit)
             gradient = runtime.upload(values, "gradient opacity")
-        shading = shading_variant(transfer_function, self._lights)
-        media = self.grid.length / self.sample_distance
+        shading = transfer_function.shading
         self.variant: Variant = replace(
             voxels.variant,
             nearest=nearest,
             by_scalar=table.by_scalar,
             compensated=summation(media),
-            **shading,
+            shaded=0 if shading is None else 2 if self._lights.headlight_only else 1,
+            sharp=shading is not None and shading.specular_power > LARGEST_POWER,
         )
         blanked = None
         if volume.blanked is not None:
@@ -163,16 +167,6 @@ class DeviceVolume:
     def giving_bricks_back(self) -> contextlib.AbstractContextManager[object]:
         """Return a context at whose end what bricks take is released."""
         return contextlib.nullcontext() if self.bricks is None else self.bricks
-
-    @property
-    def rays(self) -> GridRays:
-        """What rays are marched through."""
-        return GridRays(self.grid, self.sample_distance, self.unit_distance)
-
-    @property
-    def most_steps(self) -> int:
-        """Steps of the longest ray."""
-        return math.ceil(self.grid.length / self.sample_distance) + 1
 
     def medium_arguments(self, camera: Camera) -> dict[str, Any]:
         """Return the arguments ``MEDIUM_PARAMETERS`` (``volume/medium.cl``) of kernels that march.
@@ -382,9 +376,9 @@ def _bricks_within(
     largest = runtime.info.max_allocation
     found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
     if found is None:
-        least = least_brick_bytes(volume.dimensions, point_bytes, gradients) + others
-        whole = device_bytes(volume, scale) + others
-        raise too_small(described(volume), room, runtime, whole, least)
+        least = BrickLayout.of(volume.dimensions, SHIFTS[-1], gradients, point_bytes)
+        brick, whole = least.brick_bytes + least.table_bytes, device_bytes(volume, scale)
+        raise too_small(described(volume), room, runtime, whole + others, brick + others)
     read = voxel_reader(scale)
     return DeviceBricks(
         runtime, volume.array, read, dtype, *found, room.limit, visible, volume.name

@@ -48,7 +48,8 @@ class MarchForms:
     """The rays of a view through a volume, as ``begin_march`` of ``volume/march.cl`` takes them.
 
     ``forms``: three index positions, three model directions, then the planes to clip to, of which
-    there are ``planes``; ``rays``: those that they belong to; ``double_float``: of two floats each.
+    there are ``planes``; ``rays``: those that they belong to; ``double_float``: whether they are
+    read with what float32 rounds off them.
     """
 
     forms: list[Floats]
@@ -58,7 +59,7 @@ class MarchForms:
 
     def packed(self, *more: Floats) -> NDArray[np.float32]:
         """Return the forms, and more of the same rays, as the kernels read them."""
-        return packed([*self.forms, *more], self.double_float)
+        return packed([*self.forms, *more])
 
 
 @dataclass(frozen=True)

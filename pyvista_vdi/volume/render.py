@@ -106,25 +106,13 @@ def raycast_medium(
     ``lit_from`` is the view that decides the light of a shaded volume in place of the request's.
     A cutoff of 0 ends no ray.
     """
-    with medium.runtime.result((*request.size[::-1], 4), name="image") as image:
-        draw_medium(medium, request, image, lit_from=lit_from)
-        return medium.runtime.download(image)
-
-
-def draw_medium(
-    medium: DeviceVolume,
-    request: FrameRequest,
-    image: DeviceBuffer,
-    *,
-    lit_from: Camera | None = None,
-) -> None:
-    """Enqueue the rendering of a frame into ``image``, float32 (H, W, 4) on the device."""
     runtime, camera, options = medium.runtime, request.camera, request.options
     width, height = size = request.size
     clipped = ClippedRays(medium, request)
     bricks = medium.bricks
     with ExitStack() as stack:
         keep = stack.enter_context
+        image = keep(runtime.result((height, width, 4), name="image"))
         forms, ends = clipped.uploaded(runtime, stack)
         medium_arguments = medium.medium_arguments(lit_from or camera)
         draw = partial(
@@ -145,7 +133,7 @@ def draw_medium(
         if bricks is None:
             view = medium.rays.view(size, clipped.planes)
             draw(samples=None, states=None)(block_items(width, height), view=view)
-            return
+            return runtime.download(image)
         # Some steps of some rows at a time; the state of the rays goes on from step to step
         rows = _rows_of_part(size, bricks.memory_limit)
         items = block_items(width, rows)
@@ -163,3 +151,4 @@ def draw_medium(
                 view = medium.rays.view(size, clipped.planes, None, **part)
                 sampler.sample(view)
                 launch(block_items(width, now), view=view)
+        return runtime.download(image)

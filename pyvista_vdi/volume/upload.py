@@ -81,22 +81,14 @@ def held_voxels(
     runtime: Runtime, volume: Volume, transfer_function: TransferFunction, room: Room | None
 ) -> HeldVoxels:
     """Upload a volume for a transfer function, or what is known of it where it does not fit."""
-    native = reads_natively(runtime, volume, transfer_function, room)
+    suits = _suits_natively(volume, transfer_function)
+    native = suits and (volume.array.dtype.kind != "f" or not _too_large(runtime, volume, room))
     scale = None if native else scale_of(volume, *transfer_function.scalar_range)
     variant = voxel_variant(volume, native)
     if room is None or fits_whole(runtime, volume, scale, room):
         return HeldVoxels(*upload_voxels(runtime, volume, scale, variant), scale, variant)
     ranges = upload_ranges(runtime, volume, scale, variant, room)
     return HeldVoxels(None, ranges, scale, variant)
-
-
-def reads_natively(
-    runtime: Runtime, volume: Volume, transfer_function: TransferFunction, room: Room | None
-) -> bool:
-    """Whether kernels read the voxels as they are, or scaled to the transfer function's range."""
-    if not _suits_natively(volume, transfer_function):
-        return False
-    return volume.array.dtype.kind != "f" or not _too_large(runtime, volume, room)
 
 
 def _suits_natively(volume: Volume, transfer_function: TransferFunction) -> bool:
@@ -110,7 +102,7 @@ def _suits_natively(volume: Volume, transfer_function: TransferFunction) -> bool
     return scalars_suit_float32(low, high, dtype, transfer_function.interpolation)
 
 
-def _too_large(runtime: Runtime, volume: Volume, room: Room | None = None) -> bool:
+def _too_large(runtime: Runtime, volume: Volume, room: Room | None) -> bool:
     """Whether differences of a float32 volume's finite voxels may overflow; found once."""
     uploads = uploads_of(volume)
     if uploads.too_large is None:
@@ -356,15 +348,6 @@ def _scaled(array: NDArray[Any], scale: Scale) -> NDArray[np.float32]:
 _LEAST_POWER = 1e-30
 #: In place of a cone's cosine: the light shines everywhere.
 _NO_CONE = -2.0
-
-
-def shading_variant(transfer_function: TransferFunction, lights: Lights) -> dict[str, Any]:
-    """Return the fields of a :class:`Variant` that say how samples are lit."""
-    shading = transfer_function.shading
-    return {
-        "shaded": 0 if shading is None else 2 if lights.headlight_only else 1,
-        "sharp": shading is not None and shading.specular_power > LARGEST_POWER,
-    }
 
 
 def lighting_table(

@@ -1,6 +1,4 @@
 // Entry points to opencl/lib/double_float.cl, one work-item per case.
-//
-// -D DOUBLE_FLOAT_RAYS
 #include "lib/rays.cl"
 #pragma OPENCL FP_CONTRACT OFF
 

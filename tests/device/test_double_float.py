@@ -26,7 +26,7 @@ def test_sum_product_and_quotient(call):
     a, b = value(first), value(second)
     sums, products, quotients, less = call(
         FILE, "arithmetic", n, first, second, call.empty(n, 2), call.empty(n, 2),
-        call.empty(n, 2), call.empty(n, dtype=np.int32), DOUBLE_FLOAT_RAYS=1,
+        call.empty(n, 2), call.empty(n, dtype=np.int32),
     )  # fmt: skip
     larger = np.maximum(np.abs(a), np.abs(b))
     assert (np.abs(value(sums) - (a + b)) <= 2.0**-46 * larger).all()

@@ -52,7 +52,8 @@ def test_clip_to_planes(call, planes):
     intervals[rng.random(n) < 0.3] = [-np.inf, np.inf]
 
     found, left = call(
-        FILE, "clipped", n, forms, np.int32(planes), offsets, call.out(intervals),
+        FILE, "clipped", n, np.pad(forms, ((0, 0), (0, 0), (0, 6))), np.int32(planes),
+        offsets, call.out(intervals),
         call.empty(n, dtype=np.int32),
     )  # fmt: skip
     low, high, error = clip_reference(forms, offsets, intervals)

@@ -151,7 +151,7 @@ def test_both_depth_coordinates_at_the_border_of_their_choice(runtime, worst, di
         camera, faces + (distance - 1 - depth_origin), [0.3, 1.0, 0.5, 2.0], window=(5, 4),
         bounds=(-1, 1, -1, 1, -1, 1), depth_origin=depth_origin,
     )  # fmt: skip
-    is_long_lens = PreparedVDI(runtime, vdi).switches["DEPTH"] == "SHIFTED"
+    is_long_lens = PreparedVDI(runtime, vdi).shifted
     assert is_long_lens == (distance >= 3 and origin == 1)
     around = Camera((1.5, 1, 5), (0, 0, 0), (0, 1, 0))
     check_views(runtime, worst, vdi, [camera, around, around.azimuth(90), around.azimuth(180)])

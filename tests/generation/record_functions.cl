@@ -38,16 +38,15 @@ __kernel void shortened(int count, int way, int limit, int capacity, float per_r
     for (int k = 0; k < n; ++k)
         store_run(record, k, load_run(runs, i * capacity + k));
     __global float *errors = all_errors + errors_start((uint)i, capacity);
-    const Places starts = {0};
     float threshold = thresholds[i];
     if (way == WITHIN)
-        n = merge_within(record, &starts, n, threshold, true, per_reference, hidden_weight);
+        n = merge_within(record, 0, n, threshold, true, per_reference, hidden_weight);
     else if (way == ROOM)
-        n = make_room(record, &starts, errors, n, limit, &threshold, per_reference, hidden_weight);
+        n = make_room(record, 0, errors, n, limit, &threshold, per_reference, hidden_weight);
     else if (way == ALIKE)
         n = cut_to_limit(record, n, limit, per_reference);
     else
-        n = merge_to_limit(record, &starts, errors, n, limit, per_reference, hidden_weight);
+        n = merge_to_limit(record, 0, errors, n, limit, per_reference, hidden_weight);
     thresholds[i] = threshold;
     lengths[i] = n;
     for (int k = 0; k < n; ++k)

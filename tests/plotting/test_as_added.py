@@ -70,8 +70,9 @@ def test_another_vdi_takes_the_place_of_the_first(plotter):
     assert np.abs(shown(plotter) - before).max() > SEEN
     with pytest.raises(errors.InvalidArgumentError, match="without a volume.*add the volume"):
         actor.regenerate()
-    with pytest.raises(errors.InvalidArgumentError, match="this actor has no mapper"):
-        pvdi.VDIActor().vdi = other
+    for name, value in (("vdi", other), ("opacity_multiplier", 2)):
+        with pytest.raises(errors.InvalidArgumentError, match="this actor has no mapper"):
+            setattr(pvdi.VDIActor(), name, value)
     with pytest.raises(errors.InvalidVDIError, match="got ImageData"):
         actor.vdi = ramp()
     assert actor.vdi is other

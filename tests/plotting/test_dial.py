@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 from plugin_scenes import LOOKS, soft_ball
-from settings import with_settings
 from vtk_sources import SIZE, ready_source, some_property
 
 import pyvista_vdi as pvdi
@@ -54,12 +53,11 @@ def test_views_regenerate_below_what_was_asked_for(plotter, arguments, bound):
 
 def test_a_source_makes_what_generate_makes():
     source = ready_source()
-    asked = {"max_bytes": 10**6}
-    source.SetDial("high", **asked)
-    assert source.GetDial() == QualityTarget("high", **asked)
+    source.SetDial("high", max_bytes=10**6)
+    assert source.GetDial() == QualityTarget("high", max_bytes=10**6)
     looks = {"volume_property": some_property()}
     expected = pvdi.generate(
-        soft_ball(12), source.GetCamera(), SIZE, quality="high", **with_settings(**asked), **looks
+        soft_ball(12), source.GetCamera(), SIZE, quality="high", max_bytes=10**6, **looks
     )
     assert source.GetVDI().equals(expected)
     assert source.GetVDI().metadata["dial"]["chosen"] == expected.metadata["dial"]["chosen"]
@@ -70,5 +68,7 @@ def test_a_source_makes_what_generate_makes():
     assert source.GetVDI().window_size == SIZE
     source.SetMaxSupersegments(5)
     source.SetDial("fast")
-    with pytest.raises(InvalidArgumentError, match="max_supersegments=5"):
-        source.GetVDI()
+    refused = {"max_supersegments=5": source.GetVDI, "got 3": lambda: source.SetOptions(3)}
+    for message, call in refused.items():
+        with pytest.raises(InvalidArgumentError, match=message):
+            call()

@@ -34,8 +34,9 @@ def test_ct_shows_what_its_name_says(name, clear, shown):
     look = pvdi.presets[name]
     assert _alpha(look, clear) == 0
     assert _alpha(look, shown) > 0.04
-    low, high = look["clim"]
-    assert low < shown < high
+    assert look["clim"][0] < shown < look["clim"][1]
+    with pytest.raises(KeyError, match=f"there is no preset '{name}s': did you mean '{name}'"):
+        pvdi.presets[f"{name}s"]
 
 
 @pytest.mark.parametrize("name", list(pvdi.presets))
@@ -43,8 +44,7 @@ def test_the_name_is_a_colour_map_of_the_same_look(name):
     from pyvista_vdi.plotting.classify import Looks
 
     look = {k: v for k, v in pvdi.presets[name].items() if k != "shade"}
-    one, other = Looks(cmap=name), Looks(**look)
-    one, other = one.lookup_table(HOUNSFIELD), other.lookup_table(HOUNSFIELD)
+    one, other = (each.lookup_table(HOUNSFIELD) for each in (Looks(cmap=name), Looks(**look)))
     assert np.array_equal(one.values, other.values)
     assert one.scalar_range == other.scalar_range
     given = Looks(cmap=name, clim=(0, 5), opacity="sigmoid").lookup_table(HOUNSFIELD)

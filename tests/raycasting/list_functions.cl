@@ -1,7 +1,6 @@
 // Entry point to opencl/raycasting/first_supersegment.cl, one work-item per query.
 #define OFFSET_T int
 #define PACKED 0
-#define DEPTH RECIPROCAL
 #include "raycasting/first_supersegment.cl"
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -14,15 +13,16 @@ __kernel void counts_passing(int count, __global const ulong *faces, __global co
     const int i = get_global_id(0);
     if (i >= count)
         return;
-    const Lists all = {0, faces, faces, 0, 0, 0.0f, 0.0f};
+    const Lists all = {0, faces, faces, 0};
     const ListMet list = {lists[i].x * LISTS_PER_BUNDLE, lists[i].y, 0, 0, 0.0f};
     const bool away = how[i].x != 0;
     const int guess = min(how[i].y, list.count);
     const float depth = away ? depths[i] : -depths[i];
+    const Depths coordinate = {RECIPROCAL, 0.0f};
     Search search = begin_search(away ? how[i].y : list.count - guess);
     Faces face;
     int left = list.count + 3; // comparisons; more than any search takes
-    while (!first_supersegment(&search, &all, list, depth, true, away, 0.0f, &face) && --left > 0)
+    while (!first_supersegment(&search, &all, list, depth, true, away, coordinate, &face) && --left > 0)
         guess_again(&search, list, false);
     results[i] = left == 0 ? -1 : away ? search.p : list.count - search.p;
 }
@@ -40,7 +40,7 @@ __kernel void frame_layout(int count, __global int *result)
 {
     Frame frame;
     const int found[] = {OFFSET(lists_wide), OFFSET(lists_high), OFFSET(width), OFFSET(height), OFFSET(planes),
-                         OFFSET(depth_origin), OFFSET(cutoff), OFFSET(first_depth), OFFSET(slabs_per_depth),
+                         OFFSET(depth_kind), OFFSET(lists_near), OFFSET(depth_origin), OFFSET(cutoff), OFFSET(first_depth), OFFSET(slabs_per_depth),
                          OFFSET(depth_step), OFFSET(nearest_offset), OFFSET(regions),
                          OFFSET(one_list), sizeof(Frame)};
     if (get_global_id(0) == 0) {

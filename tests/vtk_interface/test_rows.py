@@ -196,6 +196,10 @@ REFUSED = {
     "clipped voxels": (lambda s: s.prop.UseClippedVoxelIntensityOn(), ""),
     "CoordinateSystem": (lambda s: s.actor.SetCoordinateSystemToPhysical(), ""),
     "ShaderProperty": (lambda s: s.actor.SetShaderProperty(vtkOpenGLShaderProperty()), ""),
+    "FragmentShaderReplacement": (
+        lambda s: s.actor.GetShaderProperty().AddFragmentShaderReplacement("a", True, "b", False),
+        "",
+    ),
     "have 2 components": (with_scalars(lambda v: np.stack([v, v], -1)), ""),
     "rectilinear": (image_with(rectilinear), "not a uniform grid.*resample"),
 }

@@ -204,7 +204,7 @@ class Task:
             ):
                 for part in slices:
                     records.begin(part)
-                    for chunk in march.chunks:
+                    for chunk in march.chunks(part):
                         march.advance(chunk)
                         records.make_room(last=chunk.last)
                     if options.criterion == "least-error":
@@ -328,9 +328,7 @@ def _downloaded(records: Records, part: Slice) -> tuple[NDArray[np.uint16], NDAr
         runtime.upload(begins, "places of runs") as places,
         runtime.buffer((max(made, 1), RUN_WORDS), name="runs") as runs,
     ):
-        launch = runtime.bind(
-            "large/runs.cl", "copy_runs", records.defines, records=records.runs, runs=runs
-        )
+        launch = runtime.bind("large/runs.cl", "copy_runs", records=records.runs, runs=runs)
         launch(
             records.items,
             GROUP,
@@ -351,9 +349,7 @@ def _append(records: Records, piece: Piece) -> None:
         runtime.upload(begins, "places of runs") as places,
         runtime.upload(np.ascontiguousarray(piece.runs), "runs") as runs,
     ):
-        launch = runtime.bind(
-            "large/runs.cl", "append_runs", records.defines, records=records.runs, runs=runs
-        )
+        launch = runtime.bind("large/runs.cl", "append_runs", records=records.runs, runs=runs)
         launch(
             records.items,
             GROUP,

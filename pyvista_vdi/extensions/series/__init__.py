@@ -27,5 +27,5 @@ EXTENSION = Extension(
             "pyvista_vdi.extensions.series.cli:series",
         ),
     ),
-    methods={"VDISeries.save": "pyvista_vdi.extensions.series.archive:save"},
+    methods={"VDICollection.save": "pyvista_vdi.extensions.series.archive:save"},
 )

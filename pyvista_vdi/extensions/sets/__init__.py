@@ -22,6 +22,5 @@ EXTENSION = Extension(
             "pyvista_vdi.extensions.sets.cli:generate",
         ),
     ),
-    methods={"VDISet.save": "pyvista_vdi.extensions.series.archive:save"},
     requires=("series",),  # which are stored in the same way
 )

@@ -44,8 +44,6 @@ EXTENSION = Extension(
     ),
     methods={
         "VDI._repr_mimebundle_": "pyvista_vdi.extensions.web.notebook:mime_bundle",
-        "VDISeries._repr_mimebundle_": "pyvista_vdi.extensions.web.notebook:mime_bundle",
-        "VDISet._repr_mimebundle_": "pyvista_vdi.extensions.web.notebook:mime_bundle",
         "plotter.vdi.export_html": "pyvista_vdi.extensions.web.scene:export_html",
     },
     requires=("series", "sets"),  # which pages show as well

@@ -8,7 +8,7 @@ a module needs comes before it. A module is joined if it is written by these rul
 - ``export`` begins a line, before ``function``, ``async function``, ``class``, ``const`` or
   ``let``; a ``const`` or ``let`` that is exported declares one name;
 - no two modules have a name at top level in common, and none waits there by ``await``;
-- what begins with ``/**``, and `` // `` to the end of a line, is a comment, in shaders as well.
+- ``/**`` and, to the end of a line, `` // `` are comments, and indents nothing, in shaders too.
 
 What runs in a worker, ``worker.js`` and what it imports, stands in a function of its own: its text
 is the worker's program, and where no worker may be started the page calls it itself.
@@ -43,7 +43,7 @@ _EXPORT = re.compile(
     r"^export (?=(?:async function|function|class|const|let)\*? (\w+))", re.MULTILINE
 )
 _COMMENT = re.compile(
-    r"^[ \t]*/\*\*.*?\*/[ \t]*\n|^[ \t]*(?://[^\n]*)?\n|(?<=[;,{})\]])[ \t]+// [^\n`]*",
+    r"^[ \t]*/\*\*.*?\*/[ \t]*\n|^[ \t]*(?://[^\n]*)?\n|(?<=[;,{})\]])[ \t]+// [^\n`]*|^[ \t]+",
     re.MULTILINE | re.DOTALL,
 )
 
@@ -102,7 +102,7 @@ def _in_order(entries: Iterable[str], sources: Mapping[str, str]) -> list[str]:
 
 
 def _joined(name: str, text: str) -> str:
-    """Return a module's text without imports, the word ``export``, comments and empty lines."""
+    """Return a module's text without imports, ``export``, comments, indents and empty lines."""
     text = _EXPORT.sub("", _IMPORT.sub("", _COMMENT.sub("", text)))
     if other := re.search(r"^(?:import|export)\b.*|\bimport\b *[.(].*", text, re.MULTILINE):
         raise ValueError(f"{name} has {other[0]!r}, of a form that is not bundled")

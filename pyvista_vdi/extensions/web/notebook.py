@@ -7,6 +7,7 @@ from typing import Any
 
 from pyvista_vdi.errors import MissingDependencyError, warn_external
 from pyvista_vdi.extensions.web.shown import Shown, in_a_terminal, seen_of, still
+from pyvista_vdi.model.collection import VDICollection
 
 
 def mime_bundle(
@@ -18,7 +19,8 @@ def mime_bundle(
 
     Or what there can be of it.
     """
-    if in_a_terminal():
+    of_values = isinstance(vdi, VDICollection) and vdi.value_range is not None
+    if in_a_terminal() or of_values:  # pages of several show colours
         return {}
     try:
         from pyvista_vdi.extensions.web.widget import VDIWidget

@@ -32,6 +32,7 @@ from pyvista_vdi.extensions.web.shown import (
     viewer_camera,
 )
 from pyvista_vdi.model.whole_file import whole_file
+from pyvista_vdi.quality.view_error import magnification
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
 from pyvista_vdi.vtk_pipeline.drawing.frame import planes_of
@@ -86,6 +87,9 @@ def scene_of(plotter: Any, where: str | None, *, follow: bool = False) -> ShownS
             vdi = own.MakeVDI(own.MakeRequest(seen)) if own else prop.vdi
             if vdi is None:
                 continue
+            wide = magnification(vdi, seen.camera, seen.size)
+            if wide > 2:
+                missing.append(f"detail finer than {wide:.1f} pixels of this view")
             placed: dict[str, Any] = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
             file = None if actor is None else bare_file(vdi)
             vdis.append({**placed, "opacity": prop.opacity_multiplier, "file": file})

@@ -10,16 +10,18 @@ from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit, Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.screen import LOOKUP, place_image
-from pyvista_vdi.vtk_pipeline.drawing.settings import OF_ACTORS, refuse
+from pyvista_vdi.vtk_pipeline.drawing.settings import OF_ACTORS, OF_SHADERS, refuse
 from pyvista_vdi.vtk_pipeline.drawing.window import VDIStatus
 from pyvista_vdi.vtk_pipeline.filters.source import input_of
 from pyvista_vdi.vtk_pipeline.filters.view import as_array, framed, size_of
-from pyvista_vdi.vtk_pipeline.vtk import (
-    vtkCamera,
-    vtkOpenGLShaderProperty,
-    vtkVolume,
-    weakly,
-)
+from pyvista_vdi.vtk_pipeline.vtk import vtkCamera, vtkOpenGLShaderProperty, vtkVolume, weakly
+
+
+class VDIShaderProperty(vtkOpenGLShaderProperty):  # type: ignore[misc]
+    """The property with the shader that looks the image up; it takes no other."""
+
+
+refuse(VDIShaderProperty, OF_SHADERS)
 
 
 class VDIActorMethods:
@@ -27,8 +29,8 @@ class VDIActorMethods:
 
     def _become_vdi_actor(self: Any) -> None:
         """Install a shader of its own."""
-        super().SetShaderProperty(vtkOpenGLShaderProperty())  # type: ignore[misc]
-        self.GetShaderProperty().SetFragmentShaderCode(LOOKUP)
+        super().SetShaderProperty(shader := VDIShaderProperty())  # type: ignore[misc]
+        vtkOpenGLShaderProperty.SetFragmentShaderCode(shader, LOOKUP)
         place_image(self, 0, (0, 0), (1, 1))
 
     def SetMapper(self: Any, mapper: Any) -> None:

@@ -125,6 +125,11 @@ OF_MAPPERS: Mapping[str, tuple[str, ...]] = {
     "a VDIMapper draws one VDI: give each its own VDIMapper and VDIActor": ("AddInputConnection",),
 }
 
+_SHADER = (
+    "its shader shows the VDI: set colours and opacities by the volume property, or draw the "
+    "volume by a vtkVolume and VTK's mapper"
+)
+
 #: Methods of vtkVolume.
 OF_ACTORS: Mapping[str, tuple[str, ...]] = {
     COPIES: ("ShallowCopy", "copy"),
@@ -132,9 +137,11 @@ OF_ACTORS: Mapping[str, tuple[str, ...]] = {
     "SetUserMatrix or SetPosition": (
         *("SetCoordinateSystem", "SetCoordinateSystemToPhysical", "SetCoordinateSystemToDevice"),
     ),
-    "its shader shows the VDI: set colours and opacities by the volume property, or draw the "
-    "volume by a vtkVolume and VTK's mapper": ("SetShaderProperty",),
+    _SHADER: ("SetShaderProperty",),
 }
+
+#: Methods of an actor's shader property.
+OF_SHADERS = {_SHADER: ("AddFragmentShaderReplacement", "SetFragmentShaderCode")}
 
 
 def refuse(of: type, methods: Mapping[str, tuple[str, ...]]) -> None:

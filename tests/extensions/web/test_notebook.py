@@ -62,9 +62,9 @@ def scene_of(widget):
     return list(binaries(widget).values())[1]
 
 
-def sent(widget, folder, suffix=".vdi"):
+def sent(widget, folder):
     """What a browser is sent."""
-    path = folder / f"sent{suffix}"
+    path = folder / "sent.vdi"
     path.write_bytes(file_of(widget))
     return pvdi.read(path)
 
@@ -324,10 +324,9 @@ def assert_shows(page, size, viewer, expected):
     assert np.mean(apart <= 2 / 255) >= 0.999  # where a ray runs along a border, one list is met
 
 
-def test_a_widget_of_values_edits_their_transfer_function(vdi, open_widget, tmp_path):
+def test_a_widget_of_values_edits_their_transfer_function(vdi, open_widget):
     kept = pvdi.generate(BALL, pvdi.Camera(*EYE), SIZE, classification="deferred")
     widget = VDIWidget(kept, **LOOK)
-    assert sent(widget, tmp_path).equals(kept.with_precision("8-byte"))
     with pytest.raises(UnsupportedError, match="leave out cmap, opacity"):
         VDIWidget(vdi, **LOOK)
     page = open_widget(widget)
@@ -399,12 +398,8 @@ def test_the_view_shows_a_plotter_s_scene_and_another_in_its_place(open_widget, 
     assert red(picture(page, SIZE, "viewers[0]")) == 0
 
 
-def test_a_series_in_a_notebook_has_one_time(open_widget, series, tmp_path):
+def test_a_series_in_a_notebook_has_one_time(open_widget, series):
     widget = VDIWidget(series)
-    again = sent(widget, tmp_path, ".vdis")
-    assert all(
-        one.equals(two.with_precision("8-byte")) for one, two in zip(again, series, strict=True)
-    )
     widget.time = 1.4
     page = open_widget(widget)
     page.wait_for("viewers.every(({ time }) => time === 1.5) && model.get('time') === 1.5")

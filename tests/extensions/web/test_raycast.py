@@ -201,7 +201,9 @@ def test_a_vdi_is_swapped_whole_and_nothing_is_left_behind(open_page):
     for vdi in (first, second.with_precision("8-byte"), first):
         raycaster.give(vdi)
         counts.append(page.evaluate("alive.Texture") - before)
+        raycaster.draw(vdi.camera, (3, 2))
     assert counts == [4, 3, 4]  # an exact VDI's faces and media are textures of their own
+    assert page.evaluate("alive.Program") == 2
     with pytest.raises(Exception, match="MAX_TEXTURE_SIZE is .* fewer lists"):
         page.evaluate("raycaster.set({ ...raycaster.vdi, windowSize: [1e6, 1] })")
     page.evaluate("() => raycaster.dispose()")

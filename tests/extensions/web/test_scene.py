@@ -103,15 +103,21 @@ def meshes(plotter):
 
 
 def test_vdis_apart_and_a_mesh_between_them_are_drawn_as_vtk_draws_them(plotter, page):
-    ball(plotter, at=(0.9, 1.1, 0.7), cmap="hot", opacity=[0, 0.6, 0.9])
-    actor = ball(plotter, at=(-0.9, -1.1, -0.4))
-    plotter.add_mesh(pv.Sphere(radius=0.3), color="w", lighting=False)
+    ball(plotter, at=(0.2, 0.3, 1.6), cmap="hot", opacity=[0, 0.6, 0.9])
+    actor = ball(plotter, at=(-0.2, -0.3, -1.6))
+    plotter.add_mesh(pv.Sphere(radius=0.9), color="g", lighting=False)
     plotter.show(auto_close=False)
     actor.rotate_z(30)
     actor.scale = (1, 1.4, 1)
     actor.opacity_multiplier = 2
+    plotter.enable_parallel_projection()
+    plotter.view_xy()
     give(page, plotter)
-    assert_as_vtk(page, plotter)
+    assert_as_vtk(page, plotter, mean=0.3)
+    look_from_behind(page)
+    plotter.view_xy(negative=True)
+    plotter.render()
+    assert_as_vtk(page, plotter, mean=0.3)
 
 
 def test_opaque_things_hide_a_vdi_and_are_hidden_where_they_are(plotter, page):
@@ -218,6 +224,7 @@ def test_a_series_beside_a_vdi_and_a_mesh_is_whole_in_the_page_and_plays(
     actor = plotter.add_vdi(series, **as_it_is)
     actor.opacity_multiplier = 0.5
     plotter.add_mesh(pv.Sphere(radius=0.3, center=(0, 0, 1)), color="tomato", lighting=False)
+    plotter.add_mesh(pv.Sphere(center=np.multiply(2, camera.position)))  # behind the eye
     plotter.camera_position = (camera.position, camera.focal_point, camera.view_up)
     plotter.camera.view_angle = camera.view_angle
     plotter.set_background("k")

@@ -10,6 +10,7 @@ from plugin_scenes import soft_volume
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.extensions import web
+from pyvista_vdi.extensions.web.shown import camera_of
 
 
 def checkered(ball):
@@ -39,15 +40,10 @@ def page(server, open_page):
     return open_page(url=server.url, viewport=viewport)
 
 
-def camera_of(page):
-    state = page.evaluate("viewer.camera")
-    names = ("position", "focal_point", "view_up", "view_angle")
-    return pvdi.Camera(**{name: state[name] for name in names})
-
-
 def ssim_of(page):
     shown = picture(page, SIZE).astype(np.float32) / 255
-    truth = pvdi.render_volume(BALL, camera_of(page), SIZE, **LOOK)
+    camera = camera_of(page.evaluate("viewer.camera"))
+    truth = pvdi.render_volume(BALL, camera, SIZE, **LOOK)
     return pvdi.compare_images(shown, truth).ssim
 
 
@@ -71,12 +67,12 @@ def test_the_page_is_the_viewer_and_leaks_nothing(server):
 
 
 def test_a_page_is_sent_what_its_view_needs(page):
-    wait(page, "remote.received.vdis === 1")
+    wait(page, "remote.received === 1")
     page.evaluate("viewer.camera = { ...viewer.camera, view_angle: 4 }")
-    wait(page, "remote.received.vdis === 2")
+    wait(page, "remote.received === 2")
     assert ssim_of(page) > ENOUGH
     page.page.get_by_label("Time step").fill("1")
-    wait(page, "remote.received.vdis === 3")
+    wait(page, "remote.received === 3")
 
 
 def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
@@ -90,11 +86,11 @@ def test_a_page_says_that_its_server_is_gone_comes_back_and_ends_with_its_token(
     viewport = {"width": SIZE[0], "height": SIZE[1] + 20}
     refusals = "ERR_CONNECTION|WebSocket|403"
     page = open_page(url=serving.url, viewport=viewport, expected=refusals)
-    wait(page, "remote.received.vdis === 1")
+    wait(page, "remote.received === 1")
     serving.close()
     wait(page, f"{line}.includes('no connection to the server; trying again in')")
     serving = serve("a", serving.port)
-    wait(page, f"remote.received.vdis === 2 && !{line}.includes('trying')")
+    wait(page, f"remote.received === 2 && !{line}.includes('trying')")
     serving.close()
     with serve("b", serving.port):
         wait(page, f"{line}.includes('no longer valid')")

@@ -59,20 +59,15 @@ export function bytesOfBase64(text) {
   }
 }
 
-let crcTable = null;
-
-function makeCrcTable() {
-  return Uint32Array.from({ length: 256 }, (_, n) => {
-    for (let bit = 0; bit < 8; ++bit) n = n & 1 ? 0xedb88320 ^ (n >>> 1) : n >>> 1;
-    return n;
-  });
-}
+const CRC_TABLE = Uint32Array.from({ length: 256 }, (_, n) => {
+  for (let bit = 0; bit < 8; ++bit) n = n & 1 ? 0xedb88320 ^ (n >>> 1) : n >>> 1;
+  return n;
+});
 
 /** The CRC-32 of bytes, as ZIP has it. */
 export function crc32(bytes) {
-  const table = (crcTable ??= makeCrcTable());
   let c = -1;
-  for (let k = 0; k < bytes.length; ++k) c = table[(c ^ bytes[k]) & 255] ^ (c >>> 8);
+  for (let k = 0; k < bytes.length; ++k) c = CRC_TABLE[(c ^ bytes[k]) & 255] ^ (c >>> 8);
   return ~c >>> 0;
 }
 

@@ -10,7 +10,7 @@ import { Player, playerControls } from "./player.js";
 import { isParallel } from "./rays.js";
 import { Renderer } from "./renderer.js";
 import { MOST_CLIPPING_PLANES } from "./shader.js";
-import { styleSheet } from "./style.js";
+import { STYLE_SHEET } from "./style.js";
 import { Surround } from "./surround.js";
 import { editedFrom, startOf, toldOf } from "./values.js";
 
@@ -48,7 +48,7 @@ export class VDIViewer extends HTMLElement {
   constructor() {
     super();
     const root = this.attachShadow({ mode: "open" });
-    root.adoptedStyleSheets = [styleSheet()];
+    root.adoptedStyleSheets = [STYLE_SHEET];
     const make = (name, className, more) => htmlElement(name, { className, hidden: true, ...more });
     const parts = this.#parts = {
       img: make("img", "without", { alt: "" }),
@@ -423,7 +423,7 @@ export class VDIViewer extends HTMLElement {
     if (this.#source && this.#loading.signal.aborted) this.load(this.#source).catch(() => {});
     this.#player?.resume();
     this.#controls = playerControls(this.#parts.controls, this);
-    this.#controls?.show();
+    this.#controls.show();
     this.#bar = viewerControls(this.#parts, this, (text) => this.#hint(text), signal);
     this.#listen(signal);
     this.#shown.invalidate(false);

@@ -7,8 +7,8 @@ export const AS_MADE = Object.freeze({
   brightness: 1, opacity: 1, clip: Object.freeze([0, 1, 0, 1, 0, 1]),
 });
 
-/** Factors go from 1 over this to this. */
-export const MOST_FACTOR = 16;
+// Factors go from 1 over this to this
+const MOST_FACTOR = 16;
 
 /**
  * Return a look as the viewer keeps it: see element.d.ts; what is left out is as the VDI was made. A

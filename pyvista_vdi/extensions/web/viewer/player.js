@@ -119,7 +119,6 @@ export class Player {
     this.#ahead.want(this.settled ? coming : [this.step, ...coming]);
     this.#nextFrame();
   }
-
 }
 
 /**

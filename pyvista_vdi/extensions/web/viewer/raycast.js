@@ -2,9 +2,7 @@
 import { filledTexture, programOf } from "./graphics.js";
 import { AS_MADE } from "./look.js";
 import { TEXTURE_WIDTH } from "./prepare.js";
-import {
-  frameForms, frameOf, isParallel, pixelRays, pixelsOfBoxes,
-} from "./rays.js";
+import { frameForms, frameOf, isParallel, pixelRays, pixelsOfBoxes } from "./rays.js";
 import { VERTEX_SHADER, fragmentShader } from "./shader.js";
 import { MEAN_STEPS, SPREADS, fillTable } from "./values.js";
 

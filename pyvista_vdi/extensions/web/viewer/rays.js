@@ -153,8 +153,8 @@ export function pixelRays(frame, camera, size) {
   return { origin: origin.map(toModel), direction: direction.map(toModel), reference };
 }
 
-/** Six numbers of the function normal . P + offset of model' points P along pixel rays. */
-export function formOf(rays, normal, offset) {
+// Six numbers of the function normal . P + offset of model' points P along pixel rays.
+function formOf(rays, normal, offset) {
   const form = [...rays.origin, ...rays.direction].map((row) => dot(row, normal));
   form[0] += offset;
   return form;

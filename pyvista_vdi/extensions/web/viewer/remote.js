@@ -28,7 +28,7 @@ class RemoteVDI {
 
   /** What the server offers; null before it has said so. */
   hello = null;
-  received = { vdis: 0, bytes: 0 };
+  received = 0; // VDIs
 
   /** Of the host `offered(hello)` is called when the server has said so, `says(text)` for a line. */
   constructor(viewer, url, host) {
@@ -90,7 +90,6 @@ class RemoteVDI {
     if (incoming === null || incoming.filled + part.length > incoming.file.length) return;
     incoming.file.set(part, incoming.filled);
     incoming.filled += part.length;
-    this.received.bytes += part.length;
     if (incoming.filled < incoming.file.length) return;
     [this.#incoming, this.#next] = [null, incoming.file];
     if (!this.#showing) this.#show();
@@ -103,7 +102,7 @@ class RemoteVDI {
       this.#next = null;
       try {
         await this.viewer.load(file);
-        this.received.vdis += 1;
+        this.received += 1;
       } catch (error) {
         this.#host.says(error.message);
       }

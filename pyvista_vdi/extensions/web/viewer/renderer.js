@@ -97,8 +97,7 @@ export class Renderer {
     const size = [clientWidth, clientHeight].map((edge) => Math.max(1, Math.round(edge * density)));
     if (this.size.every((edge, k) => edge === size[k])) return;
     this.size = size;
-    this.#moved = performance.now(); // the first picture of a new size is a quick one
-    this.invalidate(false);
+    this.invalidate(); // the first picture of a new size is a quick one
   }
 
   /** Have the program compiled while the first lists are still being decoded: by an empty VDI. */

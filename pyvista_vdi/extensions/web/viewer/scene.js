@@ -43,7 +43,6 @@ void main() {
   seen = depths ? vec4(-seenFrom.z) : vec4(headlight * tint, 1.0);
 }`;
 
-
 /** A scene: `viewer.scene = new Scene(bytes)`. */
 export class Scene {
   #gl = null;

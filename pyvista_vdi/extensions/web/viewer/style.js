@@ -1,6 +1,8 @@
 // How a viewer looks: its parts, the bar and its panels, the editor, the controls of a series.
 
-const STYLE = `
+/** One for all viewers of a page. No markup in text: pages may forbid it. */
+export const STYLE_SHEET = new CSSStyleSheet();
+STYLE_SHEET.replaceSync(`
 :host { display: block; position: relative; width: 100%; aspect-ratio: 16 / 9; overflow: hidden;
   background: black; print-color-adjust: exact;
   --bar: #f8f8f8e0; --ink: #181818; --edge: #0003; --mark: #0b57d0; --paper: #fff; }
@@ -80,15 +82,4 @@ progress { position: absolute; inset: auto 0 0 0; width: 100%; height: 3px; bord
 @media print {
   .box > canvas { height: 100% !important; object-fit: contain; }
   .frame, .controls, .hint { display: none; }
-}`;
-
-let sheet = null;
-
-/** The sheet of styles, one for all viewers of a page. No markup in text: pages may forbid it. */
-export function styleSheet() {
-  if (!sheet) {
-    sheet = new CSSStyleSheet();
-    sheet.replaceSync(STYLE);
-  }
-  return sheet;
-}
+}`);

@@ -152,7 +152,7 @@ function mediumInto(table, at, atLow, sums, mean, spread, stepsPerLength) {
   addMean(means, sums, low, high, share);
   if (above > 0) addMean(means, sums, high, 1, above);
   const opacity = means[3];
-  table[at] = table[at + 1] = table[at + 2] = table[at + 3] = 0;
+  table[at + 3] = 0; // whatever colour was there
   if (opacity < 1e-12) return;
   for (let c = 0; c < 3; ++c) table[at + c] = means[c] / opacity;
   const ofStep = opacity < 0.01 ? opacity * (1 + opacity * (1 / 2 + opacity * (1 / 3 + opacity / 4)))

@@ -10,7 +10,7 @@ async function drawn(...frames) {
   let rows = 0, now = 0, cost;
   const bands = [];
   const gl = {
-    SIGNALED: 1, scissor(x, y, width, height) { rows = height; }, isContextLost: () => false,
+    SIGNALED: 1, scissor(x, y, w, high) { rows = x ? NaN : high; }, isContextLost: () => false,
     clientWaitSync() { now += 1000 * cost(rows); bands.push(rows); return this.SIGNALED; },
   };
   for (const name of ["bindFramebuffer", "enable", "disable", "clearColor", "clear", "fenceSync",

@@ -58,14 +58,14 @@ test("steps are shown in their time, in order, from the first again, and it stop
 test("what is not ready in its time is left out", async () => {
   let come;
   const held = new Map([[1, new Promise((resolve) => { come = resolve; })]]);
-  const { player, shown, pass } = playing(seriesOf(6, { held }));
+  const { player, shown, pass } = playing(seriesOf(6, { held, complete: false }));
   await settled();
   player.play({ rate: 10 });
   await pass(0);
   await pass(0.3);
   come();
   await settled();
-  for (let k = 0; k < 2; ++k) await pass(0.101);
+  for (let k = 0; k < 4; ++k) await pass(0.101); // and waits for more at its end
   assert.deepEqual([shown[0], shown.at(-1)], [0, 5]);
   assert.ok(!shown.includes(2));
 });
@@ -123,6 +123,8 @@ test("of a set the nearest is shown, and its neighbours are there", async () => 
   views.push(view(0, 40)); // in one line with the first
   const further = new Surround({ ...set, length: 8, views }, { show() {}, changed() {}, failed() {} });
   further.look(view(0.1, 30));
+  assert.equal(further.step, 7);
+  further.look({ ...view(0.1, 4), parallel_scale: 30 * Math.tan(Math.PI / 12) }); // VTK's lens
   assert.equal(further.step, 7);
 });
 

@@ -8,6 +8,7 @@ const { dragOf, dragged, keyed } = await viewerModule("interaction.js");
 const { textOfView, viewOfText } = await viewerModule("link.js");
 const { checkedLook, isAsMade } = await viewerModule("look.js");
 const { frameOf, listSpace, pixelRays, modelPoint, pixelsOfBoxes } = await viewerModule("rays.js");
+const { prepare } = await viewerModule("prepare.js");
 const { editedFrom } = await viewerModule("values.js");
 const { GrowingBytes, crc32 } = await viewerModule("bytes.js");
 
@@ -47,6 +48,7 @@ test("looks, views and planes that show nothing are refused by name", () => {
     [checkedLook, { brightness: 17 }, /brightness is a factor from 1\/16 to 16; got 17/],
     [checkedLook, { opacity: NaN }, /opacity is a factor/], [checkedLook, { clip: [0, 1] }, /clip is six finite/],
     [checkedLook, { clip: [0.6, 0.5, 0, 1, 0, 1] }, /lower to a higher share/],
+    [checkedLook, { transfer: { clim: [0, 1], points: [0.5, 0, 0.4, 1] } }, /shares that grow/],
     [checkedCamera, {}, /position is three finite numbers/],
     [checkedCamera, { ...camera, position: camera.focal_point }, /are the same point/],
     [checkedCamera, { ...camera, view_angle: 180 }, /view_angle is a positive number below 180/],
@@ -88,10 +90,14 @@ test("rays of pixels go through what is seen there", () => {
     const corners = Array.from({ length: 8 }, (_, k) => frame.half.map((edge, axis) => (k >> axis & 1 ? edge : -edge)));
     const [[[x0, x1], [y0, y1]]] = pixelsOfBoxes(frame, view, [40, 30], [corners]);
     assert.ok(x0 >= 0 && x1 <= 40 && y0 >= 0 && y1 <= 30 && x1 - x0 > 10);
+    const [[[moved]]] = pixelsOfBoxes(frame, panned(view, 0.2, 0), [40, 30], [corners]);
+    assert.ok(Math.abs(moved - x0 - 6) <= 2);
   }
   const { range, depths: [a, b, c, d], reciprocals: [e, f] } = listSpace(frameOf(seen), seen);
   const z = (a * range[1] + b) / (c * range[1] + d); // of the farthest corner
   assert.ok(Math.abs(1 / (e + f * z) - (range[1] + 4 * frameOf(seen).scale)) < 1e-12);
+  const one = { offsets: [0, 1], front: [1], back: [2], color: [0, 0, 0], opticalDepth: [1] };
+  assert.ok(prepare({ ...seen, ...one, windowSize: [1, 1] }).masks.every(Boolean)); // both halves
 });
 
 test("bytes come in pieces, also as text that ends anywhere", () => {
