@@ -25,7 +25,6 @@ def serve(options: argparse.Namespace) -> int:
         with naming(step.name):
             return step.read()
 
-    arguments = classification(options)
     serve_volumes(
         Called(volume_of, steps),  # read when somebody wants to see it
         host=options.host,
@@ -35,7 +34,7 @@ def serve(options: argparse.Namespace) -> int:
         lists=math.prod(options.lists),
         **given(options, GenerationOptions, flat=True),
         device=options.device,
-        **arguments,
+        **classification(options),
     )
     print("The server has ended")
     return 0

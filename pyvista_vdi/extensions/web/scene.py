@@ -88,8 +88,7 @@ def scene_of(plotter: Any, where: str | None, *, follow: bool = False) -> ShownS
             if vdi is None:
                 continue
             wide = magnification(vdi, seen.camera, seen.size)
-            if wide > 2:
-                missing.append(f"detail finer than {wide:.1f} pixels of this view")
+            missing += [f"detail finer than {wide:.1f} pixels of this view"] * (wide > 2)
             placed: dict[str, Any] = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
             file = None if actor is None else bare_file(vdi)
             vdis.append({**placed, "opacity": prop.opacity_multiplier, "file": file})

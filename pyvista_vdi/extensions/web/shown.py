@@ -157,8 +157,7 @@ def in_a_terminal() -> bool:
 
 
 def _shell() -> Any:
-    ipython = sys.modules.get("IPython")
-    return None if ipython is None else ipython.get_ipython()
+    return getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
 
 
 def with_still(data: Any, picture: str | None, key: str) -> Any:
