@@ -21,21 +21,20 @@ typedef struct {
 } Stream;
 
 // Load the segments of the rays that are chosen.
-inline void come_to_segments(Stream *stream, __global const float4 *pool, int capacity, Int chosen)
+inline void come_to_segments(Stream *stream, __global const float *rows, int capacity, Int chosen)
 {
     const Int left = chosen && stream->slots < stream->ends;
-    const Int places = places_of_slots(SELECT((Int)(0), stream->slots, left), capacity);
-    const Segments next = {load_fours(pool, places), load_fours(pool + 1, places)};
-    stream->at.FROM = SELECT(stream->at.FROM, SELECT((Real)(INFINITY), next.FROM, left), chosen);
-    stream->at.TO = SELECT(stream->at.TO, SELECT((Real)(INFINITY), next.TO, left), chosen);
-    stream->at.OPTICAL_DEPTH = SELECT(stream->at.OPTICAL_DEPTH, next.OPTICAL_DEPTH, left);
+    const Segments next = load_segments(rows, SELECT((Int)(0), stream->slots, left), capacity);
+    stream->at.from = SELECT(stream->at.from, SELECT((Real)(INFINITY), next.from, left), chosen);
+    stream->at.to = SELECT(stream->at.to, SELECT((Real)(INFINITY), next.to, left), chosen);
+    stream->at.optical_depth = SELECT(stream->at.optical_depth, next.optical_depth, left);
     stream->at.color.x = SELECT(stream->at.color.x, next.color.x, left);
     stream->at.color.y = SELECT(stream->at.color.y, next.color.y, left);
     stream->at.color.z = SELECT(stream->at.color.z, next.color.z, left);
 }
 
 KERNEL_OF_LANES void
-merge(__global float4 *pool,             // see multi_vdi/pool.cl
+merge(__global float *pool,              // see multi_vdi/pool.cl
       int capacity,                      // slots of a ray
       __global const int *ends,          // (streams, rays)
       __global const uchar *contributes, // (streams, rays), see multi_vdi/segments.cl
@@ -78,17 +77,17 @@ merge(__global float4 *pool,             // see multi_vdi/pool.cl
         if (places.each[k] >= 0)
             owner[places.each[k]] = (short)owners.each[k];
 
-    __global const float4 *const own = pool_of(pool, first_ray, capacity);
+    __global const float *const rows = pool_of(pool, first_ray, capacity);
     Stream streams[STREAMS];
     Int first = 0;
     for (int j = 0; j < STREAMS; ++j) {
         streams[j].slots = first;
         first = streams[j].ends =
             SELECT((Int)(0), LOAD_LANES(0, ends + j * rays + first_ray), pixel.present);
-        streams[j].at.OPTICAL_DEPTH = streams[j].at.color.x = streams[j].at.color.y =
+        streams[j].at.optical_depth = streams[j].at.color.x = streams[j].at.color.y =
             streams[j].at.color.z = 0.0f;
-        streams[j].at.FROM = streams[j].at.TO = INFINITY;
-        come_to_segments(&streams[j], own, capacity, pixel.present);
+        streams[j].at.from = streams[j].at.to = INFINITY;
+        come_to_segments(&streams[j], rows, capacity, pixel.present);
     }
     Seen seen = nothing_seen();
     Real reached = -INFINITY;
@@ -96,13 +95,13 @@ merge(__global float4 *pool,             // see multi_vdi/pool.cl
         // Find the next piece that no segment begins or ends in
         Real begin = INFINITY, end = INFINITY;
         for (int j = 0; j < STREAMS; ++j)
-            begin = LOWER_OF(begin, HIGHER_OF(streams[j].at.FROM, reached));
+            begin = LOWER_OF(begin, HIGHER_OF(streams[j].at.from, reached));
         const Int goes = begin < INFINITY && !(seen.sums.w < transmittance_cutoff);
         if (!ANY(goes))
             break;
         for (int j = 0; j < STREAMS; ++j)
             end = LOWER_OF(
-                end, SELECT(streams[j].at.FROM, streams[j].at.TO, streams[j].at.FROM <= begin));
+                end, SELECT(streams[j].at.from, streams[j].at.to, streams[j].at.from <= begin));
 
         // Sum up its medium: optical depths, and colours times them
         Real optical_depth = 0.0f, red = 0.0f, green = 0.0f, blue = 0.0f;
@@ -111,12 +110,12 @@ merge(__global float4 *pool,             // see multi_vdi/pool.cl
         Int covering = 0;
         for (int j = 0; j < STREAMS; ++j) {
             const Segments at = streams[j].at;
-            const Int covers = goes && at.FROM <= begin;
-            const Int ends_here = covers && at.TO <= end;
+            const Int covers = goes && at.from <= begin;
+            const Int ends_here = covers && at.to <= end;
             // A segment that nothing cuts keeps its optical depth, however short it is in t
-            const Real share = SELECT((end - begin) / (at.TO - at.FROM), (Real)(1.0f),
-                                      ends_here && at.FROM >= begin);
-            const Real part = SELECT((Real)(0.0f), at.OPTICAL_DEPTH * share, covers);
+            const Real share = SELECT((end - begin) / (at.to - at.from), (Real)(1.0f),
+                                      ends_here && at.from >= begin);
+            const Real part = SELECT((Real)(0.0f), at.optical_depth * share, covers);
             red += part * at.color.x;
             green += part * at.color.y;
             blue += part * at.color.z;
@@ -127,7 +126,7 @@ merge(__global float4 *pool,             // see multi_vdi/pool.cl
             covering += COUNT(covers);
             if (ANY(ends_here)) {
                 streams[j].slots += COUNT(ends_here);
-                come_to_segments(&streams[j], own, capacity, ends_here);
+                come_to_segments(&streams[j], rows, capacity, ends_here);
             }
         }
         const Int several = covering > 1;

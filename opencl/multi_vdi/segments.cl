@@ -7,7 +7,7 @@
 
 // What is written of rays.
 typedef struct {
-    __global float4 *pool;
+    __global float *rows;
     int capacity;      // slots of a ray
     Int slots;         // behind the last segments; beyond the capacity where there is no room
     Real reached;      // t, so that rounding puts no segment before the end of another
@@ -32,19 +32,15 @@ inline void take_medium(Made *streams, const ListRay *ray, Real from, Real to, R
             cut_to_part(&ray->kept, n, &kept_from, &kept_to);
         Segments segments;
         segments.color = medium;
-        segments.ends.w = 0.0f;
-        segments.OPTICAL_DEPTH =
+        segments.optical_depth =
             fmin(medium.w * length_between(ray, kept_from, kept_to), MAX_OPTICAL_DEPTH);
-        const Int appended = chosen && kept_from < kept_to && segments.OPTICAL_DEPTH > 0.0f;
-        segments.FROM =
+        const Int appended = chosen && kept_from < kept_to && segments.optical_depth > 0.0f;
+        segments.from =
             HIGHER_OF(ray_time(ray, kept_from) + streams->depth_shift, streams->reached);
-        segments.TO = HIGHER_OF(ray_time(ray, kept_to) + streams->depth_shift, segments.FROM);
-        // Of rays that append nothing it is stored over by what they append next
-        const Int places = places_of_slots(streams->slots, streams->capacity);
-        store_fours(streams->pool, places, segments.ends);
-        store_fours(streams->pool + 1, places, segments.color);
-        streams->reached = SELECT(streams->reached, segments.TO, appended);
-        streams->absorbed += SELECT((Real)(0.0f), segments.OPTICAL_DEPTH, appended);
+        segments.to = HIGHER_OF(ray_time(ray, kept_to) + streams->depth_shift, segments.from);
+        store_segments(streams->rows, streams->slots, streams->capacity, &segments, appended);
+        streams->reached = SELECT(streams->reached, segments.to, appended);
+        streams->absorbed += SELECT((Real)(0.0f), segments.optical_depth, appended);
         streams->slots += COUNT(appended);
     }
 }
@@ -73,7 +69,7 @@ segments(VDI_PARAMETERS,              // its cutoff is the optical depth behind 
          float depth_shift,           // this VDI's reference depth less the frame's
          float margin,                // pixels; see `contributes`
          int capacity,                // slots of a ray
-         __global float4 *pool,       // see multi_vdi/pool.cl
+         __global float *pool,        // see multi_vdi/pool.cl
          __global int *ends,          // (streams, rays): slot behind each stream's last
          __global uchar *contributes, // (streams, rays): 1 if a ray meets the VDI, 2 if its
                                       // neighbours at `margin` pixels meet its bounds, too

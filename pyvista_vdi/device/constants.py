@@ -16,9 +16,9 @@ CELL_ITEMS = CELL * CELL
 
 #: Logarithm to base 2 of the points along each edge of a macrocell (``volume/macrocells.cl``).
 MACROCELL_SHIFT = 3
-#: float32 numbers of a recorded run (``generation/records.cl``), of a segment of a ray
-#: (``multi_vdi/pool.cl``), and of a form (``lib/rays.cl``).
-RUN_WORDS, SEGMENT_SIZE, FORM_SIZE = 8, 8, 12
+#: float32 numbers of a recorded run (``generation/records.cl``), of a segment of a ray and slots
+#: that a ray has to spare (``multi_vdi/pool.cl``), and numbers of a form (``lib/rays.cl``).
+RUN_WORDS, SEGMENT_SIZE, SPARE_SLOTS, FORM_SIZE = 8, 6, 2, 12
 #: Lists whose lengths a work-item sums up (``generation/offsets.cl``).
 LISTS_PER_ITEM = 16
 

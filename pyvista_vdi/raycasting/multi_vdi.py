@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Launch, Runtime, get_runtime, padded
-from pyvista_vdi.device.constants import CELL, CELL_ITEMS, GROUP, SEGMENT_SIZE
+from pyvista_vdi.device.constants import CELL, CELL_ITEMS, GROUP, SEGMENT_SIZE, SPARE_SLOTS
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
@@ -361,7 +361,7 @@ class _MergedCells:
         """Draw cells whose rays have room, and return how many slots those of each have needed."""
         runtime, streams = self._runtime, len(self._walks)
         room = _POOL_BYTES_CPU if runtime.is_cpu else _POOL_BYTES
-        ray_bytes = 4 * SEGMENT_SIZE * (slots + 1)
+        ray_bytes = 4 * SEGMENT_SIZE * (slots + SPARE_SLOTS)
         most = min(max(1, room // (CELL_ITEMS * ray_bytes)), len(cells))  # cells of a band
         rays = most * CELL_ITEMS
         with (
