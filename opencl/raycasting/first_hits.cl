@@ -42,5 +42,7 @@ __kernel void first_hits(VDI_PARAMETERS, int4 part, float least_optical_depth, i
     begin_path(&path, forms, &frame, pixel.a, pixel.b, opaque_ends(place, opaque_depth), true);
     Made met = {least_optical_depth, accumulated, 0.0f, false, 0.0f};
     follow(&met, &path, &lists);
-    image[place] = met.hit ? ray_time(&path.ray, met.r) : INFINITY;
+    const float passed_by = length_between(&path.ray, path.ray.r_begin, met.r);
+    image[place] =
+        met.hit ? path.ray.t_begin + passed_by / model_speed(forms, pixel.a, pixel.b) : INFINITY;
 }

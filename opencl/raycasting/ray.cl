@@ -20,6 +20,7 @@ typedef struct {
     Real r_begin;         // 0 or -1; it ends at r_begin + 1
     Real w_deep, w_along; // w(r) = w_deep + r w_along is 1 / Z, or 1 in parallel projection
     Real scale;           // model length per unit of r, but for the division by w(r_a) w(r_b)
+    Real t_begin;         // t where it begins
     Real t_deep, t_scale; // t where r is 0; t per unit of r, but for the division by w(r)
     uint regions;         // of cropping that are kept, see lib/cropping.cl; 0: all
     Kept kept;            // parts of it, in r, if CROPPED
@@ -146,6 +147,7 @@ inline void begin_ray(ListRay *ray, __global const float *forms, const Frame *fr
     const Real r_other = SELECT((Real)(1.0f), (Real)(-1.0f), ends_at_zero);
     const Time t_deep = SELECT(t0, t1, ends_at_zero), t_other = SELECT(t1, t0, ends_at_zero);
     // Lengths and t per unit of r
+    ray->t_begin = NEAREST_FLOAT(t0);
     ray->t_deep = NEAREST_FLOAT(t_deep);
     ray->w_deep = reciprocal_depth(ray->deep.z, ray->depths);
     ray->w_along = ray->depths.kind == PARALLEL  ? (Real)(0.0f)

@@ -13,7 +13,7 @@ typedef struct {
     float sample_distance, unit_distance; // model units
 } RaysOfView;
 
-// Those from the `first` on; x and y are of the part.
+// The rays of a part from work-item `first` on; x and y are of the part.
 inline Rays rays_of_view(const RaysOfView *view, uint first)
 {
     Rays rays = rays_at(block_pixel(first, view->columns), view->columns, view->rows);

@@ -235,7 +235,7 @@ class March(AbstractContextManager["March"]):
         with np.errstate(all="ignore"):
             faces = np.sort([(first - 1 - start) / slope, (first + size - start) / slope], axis=0)
             moves = corners(slope).min(over) * corners(slope).max(over) > 0
-            near = np.where(moves, corners(faces[0]).min(over), -np.inf).max(axis=0)
+            near = np.where(moves, corners(faces[0]).min(over), 0).max(axis=0, initial=0)
             far = np.where(moves, corners(faces[1]).max(over), np.inf).min(axis=0)
             steps = 1.001 * (far - near) * corners(speed).max(over) / sample_distance + 2
         return steps.reshape(slices, -1).max(axis=1)

@@ -603,6 +603,6 @@ def classify(
         **deferred.metadata,
         "opacity_unit_distance": unit,
         "transfer_function": transfer_function.to_dict(),
-        "deferred": deferred.about,
+        "deferred": {**deferred.about, "value_range": [*deferred.value_range]},
     }
     return made_vdi(ValuesLook(deferred, integrals, media_of), deferred, metadata=metadata)

@@ -79,7 +79,7 @@ class Looks(Look):
         if isinstance(self.cmap, str) and self.cmap in presets:
             # Its colours, and its range and opacity where none are given; shade is asked for apart
             preset = presets[self.cmap]
-            look = {"cmap": preset["cmap"], "n_colors": preset["n_colors"]}
+            look = {n: v for n, v in preset.items() if n not in ("clim", "opacity", "shade")}
             look |= {} if self.clim is not None else {"clim": preset["clim"]}
             linear = isinstance(self.opacity, str) and self.opacity == "linear"
             look |= {"opacity": preset["opacity"]} if linear else {}

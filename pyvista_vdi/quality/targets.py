@@ -124,7 +124,7 @@ def refuse_settings(target: QualityTarget, options: GenerationOptions) -> None:
 
 def bytes_of(vdi: VDI) -> int:
     """Return the bytes of a VDI on the device in its 8-byte form."""
-    of_lists = _LIST_BYTES * (vdi.counts.size + 1) + _HEADER_BYTES * np.count_nonzero(vdi.counts)
+    of_lists = _LIST_BYTES * vdi.counts.size + _HEADER_BYTES * np.count_nonzero(vdi.counts)
     return int(of_lists + _SUPERSEGMENT_BYTES * vdi.n_supersegments)
 
 

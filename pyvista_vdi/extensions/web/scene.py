@@ -88,9 +88,10 @@ def scene_of(plotter: Any, where: str | None, *, follow: bool = False) -> ShownS
             if vdi is None:
                 continue
             wide = magnification(vdi, seen.camera, seen.size)
-            missing += [f"detail finer than {wide:.1f} pixels of this view"] * (wide > 2)
-            placed: dict[str, Any] = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
+            coarse = wide > 2 and "dial" not in vdi.metadata  # which chooses fewer lists
+            missing += [f"detail finer than {wide:.1f} pixels of this view"] * coarse
             file = None if actor is None else bare_file(vdi)
+            placed: dict[str, Any] = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
             vdis.append({**placed, "opacity": prop.opacity_multiplier, "file": file})
             boxes.append(np.reshape(prop.GetBounds(), (3, 2)).T)
             if actor is None:

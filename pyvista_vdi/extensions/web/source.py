@@ -91,8 +91,7 @@ class Source:
         assert wish.view is not None
         camera, size = wish.view.camera, wish.view.size
         # Before the device is held: these wait for each other
-        volume = self._volume(wish.step)
-        look = self._transfer_function(wish.step)
+        volume, look = self._volume(wish.step), self._transfer_function(wish.step)
         # Cut the window down to what can be seen of the volume, or keep all of it where a corner is
         # behind the eye or close to it
         corners, window = bounds_corners(volume.bounds), np.asarray(size)

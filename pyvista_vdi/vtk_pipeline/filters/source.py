@@ -198,12 +198,9 @@ class VDISource(SceneAlgorithm, Input):
             the VDI is asked for, and other lights make another VDI; lights that merely follow the
             camera do not. What is given as a list is copied now.
         """
-        before, of_renderer = self.lit_by.Get(), hasattr(lights, "GetTwoSidedLighting")
-        self.lit_by.Set(lights if of_renderer else None)
-        if not of_renderer:
-            self._change("lights", Lights.from_any(lights), Lights())
-        elif lights is not before:
-            self.Modified()
+        made = Lights.from_any(lights)
+        self.lit_by.Set(lights if hasattr(lights, "GetTwoSidedLighting") else None)
+        self._change("lights", made, Lights())
 
     def GetLights(self) -> Lights:
         """Return what a shaded volume is lit by; of a renderer, as its lights are now."""
