@@ -14,6 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from pyvista_vdi.model.camera import check_window_size
+from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import (
     Deferral,
@@ -32,7 +33,7 @@ def _numbers_as(
 
     def read(text: str) -> Any:
         value = kind(text)
-        if not (math.isfinite(value) and low <= value <= high):
+        if not (math.isfinite(as_float(value)) and low <= value <= high):
             raise ValueError
         return value
 

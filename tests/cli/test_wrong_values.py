@@ -34,7 +34,7 @@ RIGHT = {
 }
 
 NO_NUMBER = ("x", "''", "nan", "inf")
-NO_WHOLE = ("x", "nan", "1.5")
+NO_WHOLE = ("x", "nan", "1.5", "1" + 400 * "0")
 BELOW_0 = (*NO_NUMBER, "-1")
 NOT_ABOVE_0 = ("x", "nan", "inf", "0")
 NO_COUNT = (*NO_WHOLE, "-1", "0")
