@@ -113,7 +113,7 @@ def test_a_closed_plotter_that_is_kept_holds_nothing_on_the_device(default_runti
     gc.collect()
     before = default_runtime.allocated
     plotter = new_plotter()
-    actor = plotter.add_vdi(soft_ball(), shade="classification" not in options, **LOOKS, **options)
+    actor = plotter.add_vdi(soft_ball(), **LOOKS, **options)
     first = shown(plotter)
     if options:  # else the volume has drawn the picture, and no VDI was made
         pvdi.render(actor.vdi, plotter.camera)
