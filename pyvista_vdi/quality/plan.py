@@ -29,7 +29,7 @@ _OUT_OF_DATE = 0.7
 _ANOTHER_ESTIMATE = 0.005
 #: Pixels as wide as one list from which on a VDI without its volume is said to be too coarse, and
 #: the share of rays below which it is said to cover too little: corners of bounds are often empty.
-_TOO_COARSE, _TOO_LITTLE = 2.0, 0.9
+TOO_COARSE, _TOO_LITTLE = 2.0, 0.9
 #: Least SSIM of a VDI's picture against the volume's for the VDI to be drawn at rest where the
 #: volume is at hand, where nobody said otherwise.
 SIMILAR = 0.98
@@ -272,7 +272,7 @@ def lacking(seen: Made, cone: float) -> list[tuple[str, str]]:
     if seen.coverage < _TOO_LITTLE:
         what = f"{1 - seen.coverage:.0%} of the view's rays through the volume leave what the VDI "
         found.append(("coverage", f"{what}covers: there it shows nothing; {back}"))
-    if seen.magnification > _TOO_COARSE:
+    if seen.magnification > TOO_COARSE:
         what = f"{seen.magnification:.1f} pixels of the view are as wide as one of the VDI's "
         found.append(("magnification", f"{what}lists: it shows no finer detail"))
     end = "make one of this view of the volume; regenerate='never' takes this as it is"

@@ -57,8 +57,7 @@ def viewer_script(*more: str, module: bool = False) -> str:
     behind it; by default it is a function that is called, and shows but its element.
     """
     folder = resources.files("pyvista_vdi.extensions.web") / "viewer"
-    modules = [entry for entry in folder.iterdir() if entry.name.endswith(".js")]
-    sources = {entry.name: entry.read_text(encoding="utf-8") for entry in modules}
+    sources = {e.name: e.read_text("utf-8") for e in folder.iterdir() if e.name.endswith(".js")}
     script = bundled(sources, ["element.js", *more])
     return script if module else f'(() => {{\n"use strict";\n{script}}})();\n'
 

@@ -32,6 +32,7 @@ from pyvista_vdi.extensions.web.shown import (
     viewer_camera,
 )
 from pyvista_vdi.model.whole_file import whole_file
+from pyvista_vdi.quality.plan import TOO_COARSE
 from pyvista_vdi.quality.view_error import magnification
 from pyvista_vdi.vtk_pipeline import vtk
 from pyvista_vdi.vtk_pipeline.drawing.actor import VDIActorMethods
@@ -88,7 +89,7 @@ def scene_of(plotter: Any, where: str | None, *, follow: bool = False) -> ShownS
             if vdi is None:
                 continue
             wide = magnification(vdi, seen.camera, seen.size)
-            coarse = wide > 2 and "dial" not in vdi.metadata  # which chooses fewer lists
+            coarse = wide > TOO_COARSE and "dial" not in vdi.metadata  # which chooses fewer lists
             missing += [f"detail finer than {wide:.1f} pixels of this view"] * coarse
             file = None if actor is None else bare_file(vdi)
             placed: dict[str, Any] = {"planes": _planes(prop, missing), "matrix": matrix.tolist()}
