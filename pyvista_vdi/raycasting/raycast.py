@@ -1,6 +1,6 @@
 """VDI to image, on a device."""
 
-from typing import Any
+from contextlib import ExitStack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,26 +52,24 @@ def draw(
 
     With ``hit``, t of each ray's first hit in its place, float32 (H, W).
     """
-    scene = Scene.of(prepared, request, hit)
     # Buffers that are host memory in use are waited for when they are released
-    with scene.on_device() as (forms, ends):
-        enqueue(scene, scene.arguments(forms, ends), image)
+    with ExitStack() as stack:
+        enqueue(Scene.of(prepared, request, stack.enter_context, hit), image)
 
 
-def enqueue(scene: Scene, arguments: dict[str, Any], image: DeviceBuffer) -> None:
-    """Enqueue the kernel that draws a scene, whose :meth:`Scene.arguments` are given.
+def enqueue(scene: Scene, image: DeviceBuffer) -> None:
+    """Enqueue the kernel that draws a scene.
 
     Pixels beside :attr:`Scene.part` are cleared, but not beside :attr:`Scene.only`.
     """
     runtime = scene.prepared.runtime
-    variant = choose(runtime, scene)
+    variant = choose(scene)
     pixels = scene.size[0] * scene.size[1]
     if not variant.whole and scene.only is None and scene.part.pixels < pixels:
         nothing, numbers = (0.0, 4 * pixels) if scene.hit is None else (np.inf, pixels)
         items = padded(numbers, _CLEARING_GROUP)
         cleared = runtime.bind("raycasting/clear.cl", "clear_image", image=image)
         cleared(items, _CLEARING_GROUP, numbers=numbers, nothing=nothing)
-    launch = runtime.bind(
-        *variant.kernel, variant.switches, **arguments, **variant.arguments, image=image
-    )
+    arguments = {**scene.arguments(), **variant.arguments}
+    launch = runtime.bind(*variant.kernel, variant.switches, **arguments, image=image)
     launch(variant.items, variant.group)

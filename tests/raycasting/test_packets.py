@@ -39,7 +39,7 @@ def slab_vdi(optical_depth=0.1, window=WINDOW, precision="exact"):
 
 def scene_of(runtime, vdi, camera, size=SIZE, first_hit=None, prepared=None, **options):
     request = frame(vdi, camera, size, **{"skip_empty": False, **options})
-    return Scene.of(prepared or prepared_vdi(runtime, vdi), request, first_hit)
+    return Scene.of(prepared or prepared_vdi(runtime, vdi), request, lambda kept: kept, first_hit)
 
 
 @pytest.fixture
@@ -62,9 +62,9 @@ BLOCKS, PACKETS = "raycast 16", "raycast_packets 16"
 REGIONS = {"cropping": ((-0.5, 0.5, -0.5, 0.5, -0.5, 0.5), "fence")}
 
 
-def drawn_by(runtime, scene):
+def drawn_by(scene):
     """Which kernel draws a scene, and how many rays a work-item of it follows."""
-    variant = choose(runtime, scene)
+    variant = choose(scene)
     assert len(variant.switches) <= 8
     return f"{variant.kernel[1]} {variant.rays}"
 
@@ -92,7 +92,7 @@ def test_which_kernel_follows_rays(cpu, camera, size, options, kernel):
     """Blocks near V_O, packets far from it."""
     for precision in ("exact", "8-byte"):
         scene = scene_of(cpu, slab_vdi(precision=precision), camera, size, **options)
-        assert drawn_by(cpu, scene) == kernel
+        assert drawn_by(scene) == kernel
 
 
 @pytest.mark.parametrize("kind", ["near", "around", "inside", "axis"])
@@ -103,7 +103,7 @@ def test_each_pixel_is_drawn_by_one_packet(cpu, kind, monkeypatch):
 
     def written(prepared, camera, numbers):
         """Where packets of some numbers draw."""
-        chosen = choose(cpu, scene_of(cpu, None, camera, size, prepared=prepared))
+        chosen = choose(scene_of(cpu, None, camera, size, prepared=prepared))
         first, strips, number, _ = chosen.arguments["part"]
 
         def some(self, items, group, **arguments):
