@@ -1,7 +1,6 @@
 """A VDI in a frame: the rays in its list space, as kernels take them."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,7 +14,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import FrameRequest, RenderOptions
 from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.raycasting.picking import FirstHit
-from pyvista_vdi.raycasting.prepared import PreparedVDI
+from pyvista_vdi.raycasting.prepared import Keep, PreparedVDI
 
 #: Share of a window above which rays are cast through all of it: clearing it first costs as much.
 _MOST_DRAWN = 0.9
@@ -50,7 +49,7 @@ class Scene:
         cls,
         prepared: PreparedVDI,
         request: FrameRequest,
-        keep: Callable[[DeviceBuffer], DeviceBuffer],
+        keep: Keep,
         hit: FirstHit | None = None,
         segments: bool = False,
     ) -> "Scene":
