@@ -1,6 +1,6 @@
 """Volume to VDI, on a device: rays are marched, what they record is merged, and packed."""
 
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import asdict
 from typing import Any
 
@@ -12,7 +12,7 @@ from pyvista_vdi.generation.march import CHUNK_STEPS, March, Records, Slices
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.types import Progress
 from pyvista_vdi.model.vdi import VDI, made_vdi
-from pyvista_vdi.volume.bricks import Room
+from pyvista_vdi.volume.bricks import SAMPLE_BYTES, Room
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import GridRays
 
@@ -36,12 +36,13 @@ def generate_vdi(request: GenerationRequest) -> VDI:
     runtime = get_runtime(request.device)
     slices = Slices(runtime, size, options)
     beside = slices.bytes + options.occlusion_bytes(volume)
-    room = Room(options.memory_limit, beside, slices.items * CHUNK_STEPS, slices.text)
+    samples = slices.items * CHUNK_STEPS * SAMPLE_BYTES
+    room = Room(options.memory_limit, beside, samples, slices.text)
     medium = DeviceVolume(runtime, volume, request.transfer_function, options, room=room)
     limit, stay = options.max_supersegments, options.memory_limit is None
     with ExitStack() as stack:
         keep = stack.enter_context
-        keep(medium.giving_bricks_back())
+        keep(medium.bricks or nullcontext())
         records = Records(runtime, medium.rays, camera, size, slices, options, keep)
         march = March(records, medium, camera, keep)
         lists = keep(GrowingLists(runtime, size, limit, slices.rows * width, stay=stay))

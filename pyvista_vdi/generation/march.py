@@ -13,7 +13,7 @@ from pyvista_vdi.device.constants import GROUP, RUN_WORDS, block_items
 from pyvista_vdi.generation.list_arrays import LISTS_PER_GROUP, SUPERSEGMENT_BYTES, GrowingLists
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.model.ray_forms import Floats, Rectangle, check_list_space
+from pyvista_vdi.model.ray_forms import Floats, Rectangle, check_list_space, packed
 from pyvista_vdi.volume.bricks import StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import GridRays, RayLaunch
@@ -76,9 +76,8 @@ class Slices:
         self.rows = min(height, 4 * max(1, most // per_block_row))
         self.items = block_items(width, self.rows)
         lists = self.rows * width
-        groups = -(-lists // LISTS_PER_GROUP)
-        packed_bytes = lists * (limit * SUPERSEGMENT_BYTES + 8) + 8 + 8 * groups
-        self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed_bytes
+        packed = lists * (limit * SUPERSEGMENT_BYTES + 8) + 8 + 8 * -(-lists // LISTS_PER_GROUP)
+        self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed
         self.text = f"{self.rows} rows of {width} lists of up to {limit} supersegments"
         firsts = range(0, height, self.rows)
         self.parts = [Slice(n, y, min(self.rows, height - y)) for n, y in enumerate(firsts)]
@@ -129,7 +128,7 @@ class Records:
         self.recording = {**numbers, "limit": slices.kept}
         self._budget = {**numbers, "limit": options.max_supersegments}
         items, capacity = slices.items, slices.capacity
-        self.forms = keep(runtime.upload(march.packed(), "rays", brief=True))
+        self.forms = keep(runtime.upload(packed(march.forms), "rays", brief=True))
         self.runs = keep(runtime.buffer((items, capacity, RUN_WORDS), name="recorded runs"))
         self.errors = keep(runtime.buffer((items, capacity), name="merge errors"))
         self.thresholds = keep(runtime.buffer((items,), name="merge thresholds"))

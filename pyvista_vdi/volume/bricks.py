@@ -19,6 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, kept_together
 from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.errors import DeviceMemoryError
+from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.rays import Variant
 
 #: Logarithms to base 2 of the cells along a brick's edge: large ones copy fewer points twice.
@@ -39,36 +40,20 @@ Read = Callable[[NDArray[Any]], NDArray[Any]]
 class Room:
     """Device memory for a volume: the limit, if any, and what else is on the device meanwhile.
 
-    ``working``: bytes of the buffers that the rays need; ``steps``: of all rays, whose samples
-    bricks hold at a time; ``rays``: what they are of, for messages.
+    ``working``: bytes of the buffers that the rays need; ``samples``: those of the samples of all
+    rays that bricks need beside them; ``rays``: what they are of, for messages.
     """
 
     limit: int | None
     working: int
-    steps: int
+    samples: int
     rays: str
-
-    def holds(self, runtime: Runtime, nbytes: int, others: int, *, uploaded: bool) -> bool:
-        """Whether a volume of so many bytes, and others beside, may be on the device as a whole."""
-        info = runtime.info
-        if self.limit is None and uploaded:
-            return True
-        if nbytes > info.max_allocation:
-            return False
-        if self.limit is not None:
-            return nbytes + others + self.working <= self.limit
-        return runtime.allocated + nbytes + others + self.working <= info.global_memory
 
     def in_all(self, runtime: Runtime) -> int:
         """Return the bytes that may be taken, drivers' needs left out."""
         if self.limit is not None:
             return self.limit
         return int(_SHARE_OF_FREE * (runtime.info.global_memory - runtime.allocated))
-
-    @property
-    def sample_bytes(self) -> int:
-        """Bytes of the samples that bricks need beside them."""
-        return self.steps * SAMPLE_BYTES
 
 
 @dataclass(frozen=True)
@@ -293,12 +278,14 @@ def in_parts(
         )
 
 
-def too_small(what: str, room: Room, runtime: Runtime, whole: int, brick: int) -> DeviceMemoryError:
+def too_small(
+    volume: Volume, room: Room, runtime: Runtime, whole: int, brick: int
+) -> DeviceMemoryError:
     """Return the error for a volume of which not even one brick has room.
 
     ``whole``, ``brick``: bytes of the volume, and of one brick, each with what it needs beside.
     """
-    info = runtime.info
+    info, (nx, ny, nz) = runtime.info, volume.dimensions
     given = (
         f"{info.full_name!r} has {bytes_text(info.global_memory)}, of which this process holds "
         f"{bytes_text(runtime.allocated)}, and allows {bytes_text(info.max_allocation)} per buffer"
@@ -306,8 +293,9 @@ def too_small(what: str, room: Room, runtime: Runtime, whole: int, brick: int) -
         else f"memory_limit is {bytes_text(room.limit)}"
     )
     return DeviceMemoryError(
-        f"{what} takes {bytes_text(whole + room.working)} in one piece and at least "
-        f"{bytes_text(brick + room.working + room.sample_bytes)} brick by brick, "
+        f"the volume {volume.name!r}, {nx} x {ny} x {nz} of {volume.array.dtype} takes "
+        f"{bytes_text(whole + room.working)} in one piece and at least "
+        f"{bytes_text(brick + room.working + room.samples)} brick by brick, "
         f"{room.rays} included; {given}: raise memory_limit, or use a smaller window size or "
         "max_supersegments, or another device"
     )

@@ -35,7 +35,7 @@ from pyvista_vdi.generation.march import CHUNK_STEPS, March, Records, Slice, Sli
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import held_unit_distance
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
-from pyvista_vdi.model.ray_forms import Rectangle, pixels_of_points
+from pyvista_vdi.model.ray_forms import Rectangle, packed, pixels_of_points
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
@@ -286,7 +286,7 @@ class Task:
         columns, rows = window.size
         voxel = min(medium.grid.spacing) / medium.sample_distance * (1 + 1e-9)
         with (
-            runtime.upload(march.packed(), "rays") as forms,
+            runtime.upload(packed(march.forms), "rays") as forms,
             runtime.buffer((rows, columns), name="optical depths") as depths,
         ):
             launch = RayLaunch(
