@@ -76,8 +76,8 @@ class Slices:
         self.rows = min(height, 4 * max(1, most // per_block_row))
         self.items = block_items(width, self.rows)
         lists = self.rows * width
-        packed = lists * (limit * SUPERSEGMENT_BYTES + 8) + 8 + 8 * -(-lists // LISTS_PER_GROUP)
-        self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + packed
+        arrays = lists * (limit * SUPERSEGMENT_BYTES + 8) + 8 + 8 * -(-lists // LISTS_PER_GROUP)
+        self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + arrays
         self.text = f"{self.rows} rows of {width} lists of up to {limit} supersegments"
         firsts = range(0, height, self.rows)
         self.parts = [Slice(n, y, min(self.rows, height - y)) for n, y in enumerate(firsts)]

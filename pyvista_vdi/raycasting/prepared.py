@@ -321,25 +321,20 @@ class PreparedVDI:
             if packing is None:
                 self._prepare_lists(held, begins, keep)
             else:
-                self._prepare_packed(held, keep)
+                entries = runtime.result((max(1, self._entries), 2), np.uint32, "supersegments")
+                self.faces = self.media = keep(entries)
+                prepare = runtime.bind(
+                    "raycasting/prepare.cl",
+                    "prepare_packed",
+                    **held,
+                    centre_ray=self._centre,
+                    headers=self.headers,
+                    faces=self.faces,
+                )
+                count = partial(prepare, padded(vdi.counts.size, GROUP), GROUP)
+                self.occupancy = OccupancyGrid(self, count, keep)
         if runtime.is_cpu:
             self.lit = _share_lit(vdi, *self.depths)
-
-    def _prepare_packed(self, held: dict[str, Any], keep: Keep) -> None:
-        """Prepare lists of 8-byte supersegments behind their scales, and count them."""
-        runtime, lists = self.runtime, self.window[0] * self.window[1]
-        self.faces = self.media = keep(
-            runtime.result((max(1, self._entries), 2), np.uint32, "supersegments")
-        )
-        prepare = runtime.bind(
-            "raycasting/prepare.cl",
-            "prepare_packed",
-            **held,
-            centre_ray=self._centre,
-            headers=self.headers,
-            faces=self.faces,
-        )
-        self.occupancy = OccupancyGrid(self, partial(prepare, padded(lists, GROUP), GROUP), keep)
 
     def _prepare_lists(
         self,

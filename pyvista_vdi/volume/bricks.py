@@ -127,7 +127,8 @@ class DeviceBricks(AbstractContextManager["DeviceBricks"]):
     read, of ``dtype``; how they are cut, how many ``slots`` there are, and the ``memory_limit``
     that was asked for; and which macrocells are ``visible``: other bricks are never copied.
     ``pool`` has the bricks, ``slots`` where each is whose steps are to be sampled now, int32, -1
-    for the others; ``copied`` counts bricks that were copied to the device so far.
+    for the others; ``wanted`` is for kernels to say which they need; ``copied`` counts bricks that
+    were copied to the device so far.
     """
 
     def __init__(
@@ -157,18 +158,12 @@ class DeviceBricks(AbstractContextManager["DeviceBricks"]):
             pool = runtime.buffer((slots, self._staged.size), dtype, f"bricks of volume {name!r}")
             self.pool = keep(pool)
             self.slots = keep(runtime.buffer((layout.n_bricks,), np.int32, "slots of bricks"))
-            self._wanted = keep(runtime.buffer((layout.n_bricks,), np.uint32, "wanted bricks"))
+            self.wanted = keep(runtime.buffer((layout.n_bricks,), np.uint32, "wanted bricks"))
 
     def __exit__(self, *_: object) -> None:
         self._runtime.finish()
-        for buffer in (self.pool, self.slots, self._wanted):
+        for buffer in (self.pool, self.slots, self.wanted):
             buffer.release()
-
-    def wanted(self, ask: Callable[[DeviceBuffer], None]) -> NDArray[np.intp]:
-        """Return the bricks that ``ask`` sets in the buffer it is given, ascending."""
-        self._runtime.fill(self._wanted, np.uint32(0))
-        ask(self._wanted)
-        return np.flatnonzero(self._runtime.download(self._wanted))
 
     def rounds(self, bricks: NDArray[np.intp]) -> Iterator[None]:
         """Bring bricks to the device, as many at a time as there is room for.
@@ -178,22 +173,19 @@ class DeviceBricks(AbstractContextManager["DeviceBricks"]):
         ordered = sorted(bricks.tolist(), key=lambda brick: brick not in self._slot_of)
         for first in range(0, len(ordered), self._n_slots):
             now = ordered[first : first + self._n_slots]
-            self._hold(now)
+            missing = [brick for brick in now if brick not in self._slot_of]
+            for brick in now:
+                if brick in self._slot_of:
+                    self._slot_of.move_to_end(brick)
+            for brick in missing:
+                self._runtime.give_way()
+                slot = self._free.pop() if self._free else self._slot_of.popitem(last=False)[1]
+                self._copy(brick, slot)
+                self._slot_of[brick] = slot
             slots = np.full(self.layout.n_bricks, -1, np.int32)
             slots[now] = [self._slot_of[brick] for brick in now]
             self._runtime.write(self.slots, slots)
             yield
-
-    def _hold(self, bricks: Sequence[int]) -> None:
-        missing = [brick for brick in bricks if brick not in self._slot_of]
-        for brick in bricks:
-            if brick in self._slot_of:
-                self._slot_of.move_to_end(brick)
-        for brick in missing:
-            self._runtime.give_way()
-            slot = self._free.pop() if self._free else self._slot_of.popitem(last=False)[1]
-            self._copy(brick, slot)
-            self._slot_of[brick] = slot
 
     def _copy(self, brick: int, slot: int) -> None:
         grid, own = self.layout.region(brick)
@@ -240,11 +232,10 @@ class StepSampler(AbstractContextManager["StepSampler"]):
 
     def sample(self, view: dict[str, Any]) -> None:
         """Sample steps of rays, as their numbers (``RaysOfView``) say."""
-        items = block_items(view["columns"], view["rows"])
-        wanted = self._bricks.wanted(
-            lambda table: self._launch(items, GROUP, view=view, wanted=table)
-        )
-        for _ in self._bricks.rounds(wanted):
+        items, wanted = block_items(view["columns"], view["rows"]), self._bricks.wanted
+        self._runtime.fill(wanted, np.uint32(0))
+        self._launch(items, GROUP, view=view, wanted=wanted)
+        for _ in self._bricks.rounds(np.flatnonzero(self._runtime.download(wanted))):
             self._launch(items, GROUP, view=view, wanted=None)
 
 
