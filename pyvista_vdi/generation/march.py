@@ -221,7 +221,7 @@ class March:
         variant = replace(
             medium.variant, double_float=records.march.double_float, compensated=compensated
         )
-        self._longest = self._longest_rays(arguments["classified"], medium.sample_distance)
+        self._longest = self._longest_rays(arguments["classified"], medium.rays.sample_distance)
         self._sampler = None
         if bricks is not None:
             forms, room = records.forms, records.slices.items * CHUNK_STEPS
