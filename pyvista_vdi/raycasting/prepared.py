@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime, constants, kept_together, padded
+from pyvista_vdi.device import DeviceBuffer, Keep, Runtime, constants, kept_together, padded
 from pyvista_vdi.device.constants import BUNDLE, GROUP, LIST_HEADER, LISTS_PER_ITEM, SLABS, STACK
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
@@ -54,9 +54,6 @@ _COUNTED = ("starts", "fronts", "backs")
 _NO_MEDIA = dict.fromkeys(
     ("colors", "optical_depths", "means", "spreads", "steps", "integrals"), None
 ) | {"cells": 0}
-
-#: Keeps a buffer until all are made (:func:`pyvista_vdi.device.kept_together`), and returns it.
-Keep = Callable[[DeviceBuffer], DeviceBuffer]
 
 
 class OccupancyGrid:
