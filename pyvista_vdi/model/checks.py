@@ -58,15 +58,15 @@ class Number:
     name: str = ""
     none: bool = False
 
-    def __call__(self, value: Any) -> Any:
-        """Return a value as a float or an int; raises InvalidArgumentError."""
+    def __call__(self, value: Any, name: str = "") -> Any:
+        """Return a value as a float or an int; raises InvalidArgumentError, which names it."""
         if self.none and value is None:
             return None
         number = as_whole(value) if self.whole else as_number(value)
         at_end = number in (self.low, self.high) and self.open_ended
         if not self.low <= number <= self.high or number == math.inf or at_end:
             error = InvalidArgumentTypeError if math.isnan(number) else InvalidArgumentError
-            raise error(f"{self.name} must be {self.wanted}; got {value!r}")
+            raise error(f"{name or self.name} must be {self.wanted}; got {value!r}")
         return int(number) if self.whole else number
 
 

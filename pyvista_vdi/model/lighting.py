@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -40,7 +40,7 @@ class Shading:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).copy().items():
-            object.__setattr__(self, name, Number("0 or above", name=name)(value))
+            object.__setattr__(self, name, Number("0 or above")(value, name))
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Light:
             put(self, name, as_vector(getattr(self, name), f"a light's {name}"))
         finite = Number("a finite number", -math.inf, open_ended=True)
         for name in ("cone_angle", "exponent", "intensity"):
-            put(self, name, replace(finite, name=f"a light's {name}")(getattr(self, name)))
+            put(self, name, finite(getattr(self, name), f"a light's {name}"))
         put(self, "positional", as_flag(self.positional, "a light's positional"))
         if self.kind == "headlight":  # wherever the eye is, it is the same light
             put(self, "position", Light.position)
