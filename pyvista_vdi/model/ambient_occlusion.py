@@ -20,9 +20,6 @@ from pyvista_vdi.model.volume import Grid
 
 #: Steps that a radius is cut into at least.
 _LEAST_STEPS = 8
-#: Cells along an axis that are not made coarser, however large the radius is.
-_LEAST_CELLS = 32
-
 
 _CHECKS = {
     "radius": Number("a positive length in model units", open_ended=True, none=True),
@@ -108,7 +105,7 @@ class OcclusionGrid:
         radius = occlusion.radius_in(volume)
         spacing, points = np.array(volume.spacing), np.array(volume.dimensions)
         wanted = np.floor(radius / _LEAST_STEPS / spacing * (1 + 1e-9))
-        coarsest = np.maximum((points - 1) // _LEAST_CELLS, 1)
+        coarsest = np.maximum((points - 1) // 32, 1)  # 32 cells along an axis are kept
         cell = np.clip(wanted, 1, coarsest).astype(int)
         steps = max(_LEAST_STEPS, math.ceil(radius / (cell * spacing).min() * (1 - 1e-9)))
         to_cells = np.linalg.inv(volume.direction * (spacing * cell))
