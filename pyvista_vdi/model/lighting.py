@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera, unit
+from pyvista_vdi.model.camera import Camera, Vector, unit
 from pyvista_vdi.model.checks import Number, as_flag, as_vector, one_of
-
-Vector: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

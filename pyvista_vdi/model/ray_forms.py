@@ -203,14 +203,10 @@ def direction_forms(rays: PixelRays, window_size: Sequence[int], multiplier: flo
     With that power as their value, see ``model_speed`` of ``lib/list_space.cl``. Slopes are
     about 1 then, and squares of theirs neither overflow nor vanish in float32, whatever the units.
     """
-    forms = np.zeros((3, 6))
-    forms[:, 3:] = multiplier * rays.direction.T
-    reach = np.abs(forms[:, 3:]) @ [1.0, *np.asarray(window_size) / 2]
-    _, exponent = np.frexp(reach.max())
-    scale = np.ldexp(1.0, int(np.clip(exponent, -126, 126)))
-    forms[:, 3:] /= scale
-    forms[:, 0] = scale
-    return forms
+    slopes = multiplier * rays.direction.T
+    _, exponent = np.frexp((np.abs(slopes) @ [1.0, *np.divide(window_size, 2)]).max())
+    power = np.ldexp(1.0, int(np.clip(exponent, -126, 126)))
+    return np.column_stack([np.tile([power, 0, 0], (3, 1)), slopes / power])
 
 
 def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
