@@ -201,7 +201,7 @@ def test_blocks_keep_the_values_of_one_piece(budget, default_runtime):
     assert found.metadata["blocks"] == [3, 3, 2]
 
     def sums(vdi):
-        length, mean = lengths_of(vdi.lists) * vdi.share, vdi.mean.astype(float)
+        length, mean = lengths_of(vdi) * vdi.share, vdi.mean.astype(float)
         ends = vdi.offsets.astype(int)
         of_rows = (length, length * mean, length * (mean**2 + vdi.spread.astype(float) ** 2))
         return [np.diff(np.append(0, np.cumsum(each))[ends]) for each in of_rows]
