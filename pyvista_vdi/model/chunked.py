@@ -58,11 +58,8 @@ class ChunkedArray:
         self.lazy = source if library_of(source) == "dask" else None
         self._array = source
         self._index = tuple(index) if index is not None else (slice(None),) * 3
-        if self.lazy is not None and index is not None:
-            self.lazy = self._array = source[self._index]
-            self._index = (slice(None),) * 3
         kept = [k for k, at in enumerate(self._index) if isinstance(at, slice)]
-        if len(kept) != 3 or len(self._index) != len(self._array.shape):
+        if len(kept) != 3 or len(self._index) != len(source.shape):
             raise InvalidVolumeError(
                 f"a volume is a three-dimensional array; got shape {tuple(source.shape)}: choose "
                 "time and channel (pyvista_vdi.read_volume does), index the array, or load "
@@ -97,9 +94,7 @@ class ChunkedArray:
         parts = iter(box)
         at = tuple(next(parts) if isinstance(k, slice) else k for k in self._index)
         try:
-            found = self._array[at]
-            if self.lazy is not None:
-                return np.ascontiguousarray(found.compute())
+            found = np.asarray(self._array[at])  # which Dask computes
         except (MemoryError, VDIError):
             raise
         except Exception as error:  # each library, and each function of Dask's, has its own
@@ -139,11 +134,10 @@ class ChunkedArray:
     @functools.cached_property
     def ends(self) -> tuple[float, float]:
         """The least and the largest scalar, NaN left out; all chunks are read for it, once."""
-        counts = [-(-n // chunk) for n, chunk in zip(self.shape, self.chunks, strict=True)]
-        low, high = [np.nan], [np.nan]
-        for at in itertools.product(*map(range, counts)):
-            pairs = zip(at, self.chunks, strict=True)
-            part = self[tuple(slice(k * n, (k + 1) * n) for k, n in pairs)]
+        dz, dy, dx = self.chunks
+        low, high = [], []
+        for z, y, x in itertools.product(*map(range, (0, 0, 0), self.shape, self.chunks)):
+            part = self[z : z + dz, y : y + dy, x : x + dx]
             low.append(np.fmin.reduce(part, axis=None))
             high.append(np.fmax.reduce(part, axis=None))
         return float(np.fmin.reduce(low)), float(np.fmax.reduce(high))

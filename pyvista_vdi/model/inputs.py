@@ -1,6 +1,5 @@
 """What a user calls a volume or a VDI, VTK's objects and PyVista's among it, as ours."""
 
-import functools
 import os
 import reprlib
 import weakref
@@ -13,9 +12,9 @@ from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError, InvalidVolum
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.volume import Volume
 
-#: The volume that was made of each VTK image last, by the image's id: what it was made of, which
-#: changes with the image, and the image, whose end is its end.
-_kept: dict[int, tuple[tuple[Any, ...], Volume, weakref.ref[Any]]] = {}
+#: What was made of each VTK image last, by the image's id, until the image's end: what it was made
+#: of, which changes with the image, and the volume.
+_kept: dict[int, tuple[tuple[Any, ...], Volume]] = {}
 
 
 def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Volume:
@@ -46,8 +45,9 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
         if kept is not None and kept[0] == made_of:
             return kept[1]
         made = Volume.from_vtk(volume, scalars, preference)
-        forget = functools.partial(_kept.pop, id(volume), None)
-        _kept[id(volume)] = made_of, made, weakref.ref(volume, lambda _: forget())
+        if kept is None:
+            weakref.finalize(volume, _kept.pop, id(volume))
+        _kept[id(volume)] = made_of, made
         return made
     if isinstance(volume, np.ndarray):
         raise InvalidVolumeError(

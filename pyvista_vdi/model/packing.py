@@ -41,12 +41,6 @@ _LEAST_TAU = np.float32(2.0**-19)
 _COLOR_STEPS, _COLOR_BITS = 255, (8, 16, 24)
 
 
-def lengths_of_lists(offsets: NDArray[np.uint64]) -> NDArray[np.int64]:
-    """Return the supersegments of each list, int64 (W * H,)."""
-    starts = offsets.view(np.int64)
-    return starts[1:] - starts[:-1]
-
-
 class Arrays(NamedTuple):
     """The arrays of a :class:`~pyvista_vdi.VDI`, in the order of its constructor's arguments."""
 
@@ -102,7 +96,7 @@ class Packed8:
 
     def arrays(self) -> Arrays:
         """Return the values that it stands for."""
-        n, counts = len(self.words), lengths_of_lists(self.offsets)
+        n, counts = len(self.words), np.diff(self.offsets).astype(np.int64)
         front, back, tau = (aligned_empty(n, np.float32) for _ in range(3))
         color, bits_of_color = aligned_empty((n, 3), np.float32), np.array(_COLOR_BITS, np.uint32)
         for lists, part in _pieces(counts):
@@ -124,7 +118,7 @@ class Packed8:
 
 def packing_of(arrays: Arrays, nearest: float) -> Packed8:
     """Return supersegments in 8 bytes each; ``nearest`` is the least depth in front of the eye."""
-    counts, n = lengths_of_lists(arrays.offsets), len(arrays.front)
+    counts, n = np.diff(arrays.offsets).astype(np.int64), len(arrays.front)
     if counts.max() > DEPTH_CODES:
         raise InvalidArgumentError(
             f"a list of {counts.max()} supersegments cannot be packed into 8 bytes each: at most "

@@ -19,7 +19,7 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidVDIError, UnsupportedError, VDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_bounds, as_number, as_range, as_whole, one_of
-from pyvista_vdi.model.packing import PRECISIONS, Arrays, Packed8, lengths_of_lists, packing_of
+from pyvista_vdi.model.packing import PRECISIONS, Arrays, Packed8, packing_of
 from pyvista_vdi.model.transfer_function import TransferFunction
 
 #: What of a camera differs between a view on the screen and one that covers all of a volume.
@@ -81,7 +81,7 @@ class Lists:
     @property
     def counts(self) -> NDArray[np.int64]:
         """Supersegments per list, int64 (H, W), bottom row first."""
-        return lengths_of_lists(self.offsets).reshape(self.window_size[::-1])
+        return np.diff(self.offsets).astype(np.int64).reshape(self.window_size[::-1])
 
     @property
     def nbytes(self) -> int:
@@ -486,16 +486,20 @@ def _check(vdi: VDI) -> None:
 
 def lengths_of(lists: Lists) -> NDArray[np.float64]:
     """Return the model length of each supersegment along its list's centre ray, float64 (n,)."""
-    across, along = ((2 * np.arange(n) + 1) / n - 1 for n in lists.window_size)
-    per_depth = length_per_depth(lists.camera, lists.window_size, across, along)
+    per_depth = length_per_depth(lists.camera, lists.window_size)
     thickness = lists.back.astype(np.float64) - lists.front
     return thickness * np.repeat(per_depth.ravel(), lists.counts.ravel())
 
 
 def length_per_depth(
-    camera: Camera, window: tuple[int, int], u: NDArray[np.float64], v: NDArray[np.float64]
+    camera: Camera, window: tuple[int, int], *pixels: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Return model lengths of a world unit of depth along rays through (u, v); (v, u)."""
+    """Return model lengths of a world unit of depth along the rays of pixels x, y; (y, x).
+
+    Of all pixels of the window by default.
+    """
+    x, y = pixels or map(np.arange, window)
+    u, v = (2 * x + 1) / window[0] - 1, (2 * y + 1) / window[1] - 1
     constant, along_u, along_v = camera.ray_coefficients(window)[1] @ (
         np.linalg.inv(camera.model_to_view)[:3, :3].T
     )

@@ -227,9 +227,7 @@ class Volume(Grid):
     def _range(self) -> tuple[float, float]:
         if self.chunked:
             return self.array.ends  # type: ignore[no-any-return]
-        if self.array.dtype.kind != "f":
-            return float(self.scalars.min()), float(self.scalars.max())
-        low, high = np.fmin.reduce(self.array, axis=None), np.fmax.reduce(self.array, axis=None)
+        low, high = np.fmin.reduce(self.scalars, axis=None), np.fmax.reduce(self.scalars, axis=None)
         return float(low), float(high)
 
     def __repr__(self) -> str:

@@ -146,10 +146,7 @@ def coarser(vdi: VDI, step: int = 4) -> VDI:
     offsets = np.concatenate([[0], np.cumsum(counts)])
     rows = np.repeat(vdi.offsets.view(np.int64)[taken] - offsets[:-1], counts)
     rows += np.arange(offsets[-1])
-    old = [(2 * p + 1) / n - 1 for p, n in zip((x, y), vdi.window_size, strict=True)]
-    stretch = length_per_depth(camera, window, *new) / length_per_depth(
-        camera, vdi.window_size, *old
-    )
+    stretch = length_per_depth(camera, window) / length_per_depth(camera, vdi.window_size, x, y)
     tau = vdi.optical_depth[rows] * np.repeat(stretch.ravel(), counts)
     arrays = vdi.arrays.take(offsets, rows)._replace(optical_depth=tau.astype(np.float32))
     return made_vdi(arrays, vdi, camera=camera, window_size=window, metadata={})
