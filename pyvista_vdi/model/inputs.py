@@ -56,7 +56,7 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
         )
     raise InvalidVolumeTypeError(
         "expected a pyvista.ImageData, a vtkImageData, a pyvista_vdi.Volume or a file's path; "
-        f"got {_described(volume)}"
+        f"got {type(volume).__name__}"
     )
 
 
@@ -70,13 +70,7 @@ def as_vdi(vdi: Any) -> VDI:
         )
     if hasattr(vdi, "GetClassName"):
         return as_vdi(registry.method("VDI.from_image")(vdi))
-    hint = ": read it by pyvista_vdi.read(path)" if isinstance(vdi, str | os.PathLike) else ""
-    raise InvalidVDIError(
-        f"expected a VDI or its VTK form (a vtkImageData); got {_described(vdi)}{hint}"
-    )
-
-
-def _described(thing: object) -> str:
-    if isinstance(thing, str | os.PathLike):
-        return f"the path {os.fspath(thing)!r}"
-    return type(thing).__name__
+    got = type(vdi).__name__
+    if isinstance(vdi, str | os.PathLike):
+        got = f"the path {os.fspath(vdi)!r}: read it by pyvista_vdi.read(path)"
+    raise InvalidVDIError(f"expected a VDI or its VTK form (a vtkImageData); got {got}")
