@@ -33,11 +33,6 @@ class Grid:
     direction: NDArray[np.float64]
     unit_distance: float | None = None
 
-    @classmethod
-    def of(cls, grid: Grid) -> Grid:
-        """Return the grid of a volume."""
-        return cls(grid.dimensions, grid.spacing, grid.origin, grid.direction, grid.unit_distance)
-
     @functools.cached_property
     def index_to_model(self) -> NDArray[np.float64]:
         """Point index (x, y, z) to model coordinates, float64 (4, 4)."""

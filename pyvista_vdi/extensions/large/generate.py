@@ -24,7 +24,6 @@ from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.packing import Arrays
 from pyvista_vdi.model.types import ClientLike
 from pyvista_vdi.model.vdi import VDI, made_vdi
-from pyvista_vdi.model.volume import Grid
 
 #: Blocks that would fit into a limit of memory: beside one there are lists, and its halo.
 _BLOCKS_IN_LIMIT = 4
@@ -49,7 +48,7 @@ def generate_in_blocks(
         block_bytes = min(block_bytes, limit // _BLOCKS_IN_LIMIT)
     array: Any = volume.array
     cuts = cuts_of(array.shape, array.chunks, array.dtype.itemsize, block_bytes)
-    blocks = Blocks.of(Grid.of(volume), cuts, request.transfer_function)
+    blocks = Blocks.of(volume, cuts, request.transfer_function)
     gradients = request.transfer_function.gradient_opacities is not None
     scalars = volume.finite_range() if gradients else (np.nan, np.nan)  # nothing else asks
     task = Task.of(blocks, request, scalars)

@@ -43,9 +43,9 @@ class Cluster:
         self._progress, self._done = request.progress, 0.0
         self._token, self._stage = uuid.uuid4().hex[:12], 0
         self._futures: weakref.WeakSet[Future[Any]] = weakref.WeakSet()  # that are still wanted
-        self._lazy = array.lazy
+        self._array = array.array
         files = [str(path) for path in array.files]
-        self._sent = None if array.lazy is not None else (dumps(array), files)
+        self._sent = None if array.lazy else (dumps(array), files)
         answers = client.run(_able, request.device, files, on_error="return")
         if not answers:
             raise NoDeviceError("the cluster has no workers: start some, or wait for them")
@@ -69,7 +69,7 @@ class Cluster:
         """Return what reads the volume's values in boxes, or, if Dask computes them, futures."""
         if self._sent is not None:
             return [functools.partial(_read, *self._sent, box) for box in boxes]
-        futures = self._client.compute([self._lazy[box] for box in boxes])
+        futures = self._client.compute([self._array[box] for box in boxes])
         self._futures.update(futures)
         return list(futures)
 
