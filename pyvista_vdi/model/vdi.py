@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 import os
 import reprlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -522,35 +521,13 @@ def picture_view(shown: Any) -> tuple[Camera, tuple[int, int]]:
     return camera, size
 
 
-@dataclass(frozen=True, eq=False)
-class ValuesLook:
-    """Values and the transfer function that a VDI shows of them.
+def classification_of(
+    deferred: DeferredVDI, transfer_function: TransferFunction
+) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    """Return what kernels take of a transfer function, and a classified VDI's metadata.
 
-    ``integrals``: what kernels take of a transfer function, float32 (CELLS + 2, 2, 4): the low end
-    of the range, then the integrals over cells up to each, in pairs of a large part and what it
-    leaves. ``media_of``: what makes straight colours and optical depths of some supersegments.
-    """
-
-    deferred: DeferredVDI
-    integrals: NDArray[np.float32]
-    media_of: Callable[[ValuesLook, Any], Media]
-
-    def arrays(self) -> Arrays:
-        """Return the arrays: what is transparent is left out."""
-        color, optical_depth = self.media_of(self, slice(None))
-        arrays = self.deferred.arrays._replace(color=color, optical_depth=optical_depth)
-        rows = np.flatnonzero(optical_depth > 0)
-        return arrays.take(np.searchsorted(rows, arrays.offsets.view(np.int64)), rows)
-
-
-def classify(
-    deferred: DeferredVDI,
-    transfer_function: TransferFunction,
-    media_of: Callable[[ValuesLook, Any], Media],
-) -> VDI:
-    """Return the VDI that a transfer function makes of what is kept (docs/dev/conventions.md).
-
-    The VDI's arrays are made when they are asked for, by ``media_of``; a raycast asks for none.
+    Float32 (CELLS + 2, 2, 4): the low end of the range, then the integrals over cells up to each,
+    in pairs of a large part and what it leaves (docs/dev/conventions.md).
     """
     for name, asked in (
         ("shading", transfer_function.shading),
@@ -579,10 +556,7 @@ def classify(
         of_step = -np.expm1(np.log1p(-opacity) * deferred.sample_distance / unit)
     of_cells = np.stack([*(of_step * each for each in rgb), of_step], axis=1)
     units = np.rint(of_cells * _UNITS).astype(np.int64)
-    table = np.zeros((CELLS + 2, 4), np.int64)
-    table[0] = units[0]
-    np.cumsum(units[1:], axis=0, out=table[2:])
-    whole = table / _UNITS
+    whole = np.concatenate([units[:1], 0 * units[:1], units[1:].cumsum(axis=0)]) / _UNITS
     large = whole.astype(np.float32)
     integrals = np.stack([large, (whole - large).astype(np.float32)], axis=1)
     metadata = {
@@ -591,4 +565,4 @@ def classify(
         "transfer_function": transfer_function.to_dict(),
         "deferred": {**deferred.about, "value_range": [*deferred.value_range]},
     }
-    return made_vdi(ValuesLook(deferred, integrals, media_of), deferred, metadata=metadata)
+    return integrals, metadata

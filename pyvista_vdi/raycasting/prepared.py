@@ -16,8 +16,9 @@ from pyvista_vdi.device.constants import BUNDLE, GROUP, LIST_HEADER, LISTS_PER_I
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import lists_are_far
-from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, ValuesLook, made_vdi
+from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, made_vdi
 from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.classified_values import ValuesLook
 from pyvista_vdi.raycasting.packets import share_lit
 from pyvista_vdi.volume.upload import release_voxels
 
@@ -46,9 +47,7 @@ _ARRAYS = {
 }
 _COUNTED = ("starts", "fronts", "backs")
 #: What media are made of: colours and optical depths, or a deferred VDI's values.
-_NO_MEDIA = dict.fromkeys(
-    ("colors", "optical_depths", "means", "spreads", "steps", "integrals"), None
-) | {"cells": 0}
+_NO_MEDIA = dict.fromkeys(("colors", "optical_depths", "means", "spreads", "steps", "integrals"))
 
 #: Keeps a buffer until all are made (:func:`pyvista_vdi.device.kept_together`), and returns it.
 Keep = Callable[[DeviceBuffer], DeviceBuffer]
@@ -270,9 +269,8 @@ class PreparedVDI:
                 last = packing.codes(offsets[occupied + 1] - 1)[1]
                 ends = np.stack([packing.depths(occupied, each) for each in (first, last)], axis=1)
             else:
-                made_on: Any = getattr(vdi.late, "on", None)
-                if made_on is not None:
-                    held |= stack.enter_context(made_on(runtime))
+                if hasattr(vdi.late, "on"):
+                    held |= stack.enter_context(vdi.late.on(runtime))
                 if not held:
                     arrays: Any = zip(_ARRAYS.items(), vdi.arrays, strict=True)
                     held = {name: upload(array, what) for (name, what), array in arrays}
@@ -302,12 +300,7 @@ class PreparedVDI:
         )
         self.occupancy = OccupancyGrid(self, partial(prepare, padded(lists, GROUP), GROUP), keep)
 
-    def _prepare_lists(
-        self,
-        arrays: dict[str, Any],
-        begins: DeviceBuffer,
-        keep: Keep,
-    ) -> None:
+    def _prepare_lists(self, arrays: dict[str, Any], begins: DeviceBuffer, keep: Keep) -> None:
         """Prepare exact lists, and count them in the occupancy grid.
 
         ``begins``: where bundles begin that have all supersegments of ``arrays``.
@@ -321,7 +314,7 @@ class PreparedVDI:
         prepare = runtime.bind(
             "raycasting/prepare.cl",
             "prepare_lists",
-            **{**_NO_MEDIA, **arrays},
+            **{"cells": 0, **_NO_MEDIA, **arrays},
             begins=begins,
             centre_ray=self._centre,
             depth_kind=constants.PARALLEL if self.double_float else self.depth_kind,
@@ -410,9 +403,8 @@ class KeptValues(PreparedVDI):
         arrays = {"means": deferred.mean, "spreads": deferred.spread, "steps": deferred.steps}
         self._lists = made_vdi(deferred.arrays, deferred)
         with kept_together() as keep:
-            #: Means, spreads and steps of the supersegments.
             self.values = {
-                name: keep(runtime.upload(np.ascontiguousarray(array), f"{name} of values"))
+                name: keep(runtime.upload(array, f"{name} of values"))
                 for name, array in arrays.items()
             }
             super().__init__(runtime, self._lists)
@@ -431,7 +423,7 @@ class KeptValues(PreparedVDI):
         """Return what a transfer function shows: what is transparent is left out."""
         runtime, shown = self.runtime, copy.copy(self)
         if runtime.is_cpu:
-            shown.lit = share_lit(self._lists, *self.depths, partial(look.media_of, look))
+            shown.lit = share_lit(self._lists, *self.depths, look.media_of)
         with (
             kept_together() as keep,
             runtime.upload(look.integrals, "integrals of a transfer function") as table,
@@ -449,9 +441,7 @@ class _MadeOnce:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._places: weakref.WeakKeyDictionary[
-            Any, dict[Runtime, tuple[threading.Lock, list[Any]]]
-        ]
+        self._places: weakref.WeakKeyDictionary[Any, dict[Runtime, tuple[Any, list[Any]]]]
         self._places = weakref.WeakKeyDictionary()
 
     def of(self, runtime: Runtime, thing: Any, make: Callable[[], Any]) -> Any:
@@ -476,9 +466,8 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
     """Return the VDI on the device, made once and kept as long as the VDI lives."""
 
     def make() -> PreparedVDI:
-        look = vdi.late
-        if isinstance(look, ValuesLook) and look.deferred.n_supersegments:
-            return kept_values(runtime, look.deferred).shown(look)
+        if isinstance(vdi.late, ValuesLook):
+            return kept_values(runtime, vdi.late.deferred).shown(vdi.late)
         return PreparedVDI(runtime, vdi)
 
     return _prepared.of(runtime, vdi, make)  # type: ignore[no-any-return]
@@ -499,6 +488,5 @@ def release_from_devices(things: Iterable[VDI | DeferredVDI | Volume | None]) ->
             _kept.release(thing)
         elif thing is not None:
             _prepared.release(thing)
-            late: Any = thing.late
-            if hasattr(late, "on"):
-                late.arrays()
+            if hasattr(thing.late, "on"):
+                thing.late.arrays()
