@@ -21,7 +21,6 @@ from pyvista_vdi.measure.bench import Bench, Image, accuracy, take_turns
 from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import over_background
-from pyvista_vdi.model.standard_cases import ANGLES, WINDOW_SIZE
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.prepared import prepared_vdi
@@ -46,9 +45,9 @@ Images = dict[str, Image]
 def measure(
     volume: Volume,
     classification: Mapping[str, Any],
-    window_size: tuple[int, int] = WINDOW_SIZE,
+    window_size: tuple[int, int] = (1280, 720),
     *,
-    angles: Sequence[float] = ANGLES,
+    angles: Sequence[float] = (0.0, 5.0, 30.0),
     max_supersegments: int = 20,
     precision: str = "exact",
     sample_distance: float | None = None,

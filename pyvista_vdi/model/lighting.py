@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.camera import Camera, unit
 from pyvista_vdi.model.checks import Number, as_flag, as_vector, one_of
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -118,19 +118,17 @@ class Light:
         names += ["Positional", "AttenuationValues", "ConeAngle", "Exponent", "Intensity"]
         return cls(kind, *(getattr(light, f"Get{name}")() for name in names))
 
-    def in_world(self, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return position and unit direction of travel in world coordinates, float64 (3,) each."""
-        position, target = np.array(self.position), np.array(self.focal_point)
+    def in_view(self, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return position and unit direction of travel in view space, float64 (3,) each."""
         if self.kind == "headlight":
-            position, target = np.array(camera.position), np.array(camera.focal_point)
-        elif self.kind == "camera":
-            right, up, forward = camera.axes
-            centre = np.array(camera.focal_point)
-            distance = np.linalg.norm(centre - camera.position)
-            axes = distance * np.array([right, up, -forward])
-            position, target = centre + position @ axes, centre + target @ axes
-        direction = target - position
-        return position, direction / np.linalg.norm(direction)
+            return np.zeros(3), np.array([0.0, 0.0, 1.0])
+        ends = np.array([self.position, self.focal_point])
+        if self.kind == "scene":
+            ends = (ends - camera.position) @ camera.axes.T
+        else:
+            distance = np.linalg.norm(np.subtract(camera.focal_point, camera.position))
+            ends = distance * ((0, 0, 1) + ends * (1, 1, -1))
+        return ends[0], unit(ends[1] - ends[0])
 
 
 @dataclass(frozen=True)

@@ -208,7 +208,7 @@ class PreparedVDI:
         rays.check_list_space(vdi.camera, vdi.bounds)
         #: View depths of the bounds, and the least that is in front of V_O's eye, world units.
         self.depths = near, far = rays.depth_range(vdi.camera, vdi.bounds)
-        self.nearest = rays.nearest_depth(vdi.camera, vdi.bounds) if not self.parallel else -np.inf
+        self.nearest = rays.nearest_depth(vdi.camera, vdi.bounds)
         # An origin much closer than the data costs the coordinate the digits that it is to save
         closest = min(near, self.depth_origin)
         #: Whether the depth coordinate is that of a long lens.

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, get_runtime, padded
 from pyvista_vdi.model.options import FrameRequest
-from pyvista_vdi.model.ray_forms import reference_depth
+from pyvista_vdi.model.ray_forms import pixel_rays
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose
 from pyvista_vdi.raycasting.picking import FirstHit
@@ -42,7 +42,8 @@ def render_first_hits(vdi: VDI, request: FrameRequest, hit: FirstHit) -> NDArray
     with runtime.buffer(request.size[::-1], name="depth of first hits") as image:
         draw(prepared, request, image, hit)
         t = runtime.download(image)
-    return (t + reference_depth(request.camera, vdi.bounds)).astype(np.float32)
+    rays = pixel_rays(request.camera, request.size, vdi.bounds)
+    return (t + rays.reference_depth).astype(np.float32)
 
 
 def draw(

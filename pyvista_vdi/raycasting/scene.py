@@ -123,7 +123,7 @@ class Scene:
         """Make the rays of a frame."""
         camera, size, options = request.camera, request.size, request.options
         pixel_rays = rays.pixel_rays(camera, size, prepared.bounds)
-        coordinates = [pixel_rays.form(row[:3], row[3]) for row in prepared.list_rows]
+        coordinates = pixel_rays.forms(prepared.list_rows)
         # The opacity multiplier is in the lengths that kernels measure by these forms: a length
         # times m absorbs as m times the extinction
         direction = rays.direction_forms(pixel_rays, size, options.opacity_multiplier)
@@ -131,12 +131,11 @@ class Scene:
         # Keep what is in the bounds, in V_O's viewport and in front of its eye, and in the view
         u, v, _, denominator = coordinates
         wide, high = (edge / 2 * denominator for edge in prepared.window)
-        planes = rays.box_planes(pixel_rays, prepared.bounds)
+        planes = [*rays.box_planes(pixel_rays, prepared.bounds)]
         planes += [wide + u, wide - u, high + v, high - v]
         if not prepared.parallel:
             planes.append(denominator - prepared.nearest * np.eye(6)[0])
-        planes += rays.view_planes(camera, pixel_rays, options.clipping_planes)
-        planes += cut
+        planes += [*rays.view_planes(camera, pixel_rays, options.clipping_planes), *cut]
         forms = [*coordinates, *direction, *planes, *beyond]
         return cls(
             prepared,
@@ -175,8 +174,7 @@ class Scene:
         """How each pixel is drawn from a list of its own; None if it cannot be."""
         prepared, camera = self.prepared, self.camera
         near, far = rays.depth_range(camera, prepared.bounds)
-        if not camera.parallel_projection:
-            near = max(near, rays.nearest_depth(camera, prepared.bounds))
+        near = max(near, rays.nearest_depth(camera, prepared.bounds))
         return aligned_view(
             self.size,
             prepared.window,
