@@ -59,7 +59,7 @@ def generate(options: argparse.Namespace) -> int:
 
 
 def say_vdi(options: argparse.Namespace, vdi: object, more: str = "") -> None:
-    """Print what was written to ``--output``."""
+    """Print what was written to ``--output``, a VDI or several."""
     n_bytes = f"{Path(options.output).stat().st_size / 2**20:.1f} MiB"
     print(f"{printable(options.output)}: {vdi}, {n_bytes}{more}")
 

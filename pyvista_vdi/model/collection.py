@@ -25,11 +25,8 @@ class VDICollection(Sequence[VDI]):
     """
 
     times: tuple[float, ...] | None = None
-
-    @property
-    @abstractmethod
-    def camera(self) -> Camera:
-        """The view to begin with."""
+    #: The view to begin with.
+    camera: Camera
 
     @abstractmethod
     def nearest(self, at: Any) -> int:

@@ -6,9 +6,8 @@ import argparse
 from contextlib import closing
 from pathlib import Path
 
-from pyvista_vdi.cli.generate import generating_view
+from pyvista_vdi.cli.generate import generating_view, say_vdi
 from pyvista_vdi.cli.inputs import classification, given, read_volume
-from pyvista_vdi.cli.text import printable
 from pyvista_vdi.extensions.sets.generate import generate_set
 from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.classification import Classification
@@ -29,8 +28,7 @@ def generate(options: argparse.Namespace) -> int:
     with closing(DelayedBar(label="generating a set")) as bar:
         vdi_set = generate_set(volume, progress=bar, **how)
         vdi_set.save(target, progress=bar)
-    n_bytes = f"{target.stat().st_size / 2**20:.1f} MiB"
-    print(f"{printable(options.output)}: {len(vdi_set)} VDIs, {n_bytes}")
+    say_vdi(options, f"{len(vdi_set)} VDIs")
     return 0
 
 
