@@ -128,7 +128,8 @@ def volume_name(options: argparse.Namespace) -> str:
 def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterator[dict[str, Path]]:
     """Yield where ``--out`` has the files go, after finding that they can be written there.
 
-    A folder that is made for them, and into which nothing is written, is gone again.
+    They are named when they are written. A folder that is made for them, and into which nothing is
+    written, is gone again.
     """
     folder = Path(options.out)
     made = not folder.exists()
@@ -139,17 +140,14 @@ def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterato
             f"the folder {folder} cannot be made: {error.strerror}; choose another --out"
         ) from error
     try:
-        yield {kind: check_writable(folder / f"{stem}.{kind}") for kind in kinds}
+        files = {kind: check_writable(folder / f"{stem}.{kind}") for kind in kinds}
+        yield files
     except BaseException:
         if made:
             with suppress(OSError):  # something is there
                 folder.rmdir()
         raise
-
-
-def say_written(files: Iterable[Path | str]) -> None:
-    """Name the files that were written."""
-    print("Written: " + ", ".join(printable(path) for path in files))
+    print("Written: " + ", ".join(map(printable, files.values())))
 
 
 def camera(options: argparse.Namespace, default: Camera) -> Camera:
