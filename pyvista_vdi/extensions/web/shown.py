@@ -151,12 +151,8 @@ def png(pixels: NDArray[np.uint8]) -> str:
     return b64encode(stream.getvalue()).decode()
 
 
-def in_a_terminal() -> bool:
-    """Whether IPython shows text alone; other notebooks may have no IPython."""
-    return _shell() is not None and not hasattr(_shell(), "kernel")
-
-
-def _shell() -> Any:
+def shell() -> Any:
+    """Return IPython's shell, which has a ``kernel`` if it shows more than text, or None."""
     return getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
 
 
@@ -169,11 +165,11 @@ def with_still(data: Any, picture: str | None, key: str) -> Any:
     """
     if picture is None:
         return data
-    if not hasattr(_shell(), "kernel"):
+    if not hasattr(shell(), "kernel"):
         return {**data, "image/png": picture}
     image = f'<img data-vdi="{key}" style="max-width: 100%" alt="a still picture of a volume" '
     html = f'{image}src="data:image/png;base64,{picture}">'
-    _shell().display_pub.publish({"text/html": html, "text/plain": "a still picture of a volume"})
+    shell().display_pub.publish({"text/html": html, "text/plain": "a still picture of a volume"})
     return data
 
 
