@@ -17,7 +17,7 @@ from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.volumes.in_file import placed
 from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.classification import Look
+from pyvista_vdi.model.classification import Classification, Look
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -47,12 +47,16 @@ def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dic
 
 
 def classification(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments that say how the volume looks; which array it is, the volume says."""
+    """Return the arguments that say how the volume looks; which array it is, the volume says.
+
+    What cannot be is refused now, before the volume is read.
+    """
     found = given(options, Look)
     path = getattr(options, "transfer_function", None)
     if path is not None:
         function = from_json(path, TransferFunction.from_dict, "transfer function")
         found["transfer_function"] = function
+    Classification(**found)
     return found
 
 

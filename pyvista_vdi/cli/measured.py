@@ -21,8 +21,6 @@ from pyvista_vdi.io import write_png
 from pyvista_vdi.measure.bench import as_json
 from pyvista_vdi.measure.compare import contact_sheet, measure, table
 from pyvista_vdi.measure.tradeoff import AXES, COSTS, DEFAULT_AXES, measure_tradeoff, sweep
-from pyvista_vdi.model.arguments import records_of
-from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.plotting.progress import DelayedBar
 
@@ -30,7 +28,6 @@ from pyvista_vdi.plotting.progress import DelayedBar
 def compare(options: argparse.Namespace) -> int:
     """Compare a volume's pictures, and write a table, a picture, a JSON file and the VDI."""
     look = classification(options)
-    records_of(look, "compare", Classification)  # refused before anything is read or written
     stem, volume = volume_name(options), read_volume(options)
     how = {n: getattr(options, n) for n in ("angles", "repeats", "device")}
     how |= {"vtk": not options.no_vtk, "name": stem, **given(options, GenerationOptions, flat=True)}
@@ -48,7 +45,6 @@ def compare(options: argparse.Namespace) -> int:
 def tradeoff(options: argparse.Namespace) -> int:
     """Measure what each setting costs and gives, and write JSON and tables."""
     look = classification(options)
-    records_of(look, "tradeoff", Classification)  # refused before the volume is read
     settings = sweep(dict(map(_axis, options.sweep or DEFAULT_AXES)))
     name, volume = volume_name(options), read_volume(options)
     how = {n: getattr(options, n) for n in ("angles", "repeats", "generations", "device")}

@@ -28,9 +28,7 @@ from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.series import VDISeries, check_range
 from pyvista_vdi.io import read, read_info
 from pyvista_vdi.io.files import holds
-from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.checks import as_number
-from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
@@ -65,9 +63,7 @@ def series(options: argparse.Namespace) -> int:
     # Refuse what cannot be before a volume is read
     times = _times(steps) if options.times is None else options.times
     vdis = VDISeries(Called(vdi_of, range(len(steps))), times)
-    look = classification(options)
-    records_of(look, "series", Classification)
-    how = look | given(options, GenerationOptions, Deferral)
+    how = classification(options) | given(options, GenerationOptions, Deferral)
     check_writable(with_suffix(Path(options.output), (".vdis",), "a series"))
     with closing(DelayedBar(label="writing a series")) as bar:
         with naming(steps[0].name):

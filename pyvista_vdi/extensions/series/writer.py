@@ -147,7 +147,16 @@ class SeriesWriter(contextlib.AbstractContextManager["SeriesWriter"]):
         VDIFileError
             If the writer is closed or the step cannot be written; the steps before stay.
         """
-        time = self.checked_time(time)
+        if self._lock is None:
+            raise VDIFileError(
+                f"{self.path} is closed: no step can be appended; make another SeriesWriter with "
+                "append=True to continue"
+            )
+        time = float(len(self)) if time is None else checked_time(time)
+        if self._times and not time > self._times[-1]:
+            raise InvalidArgumentError(
+                f"times must ascend; got {time} after {self._times[-1]}, that of the last step"
+            )
         if not isinstance(step, VDI | DeferredVDI):
             if self._make is None:
                 raise InvalidArgumentError(
@@ -171,20 +180,6 @@ class SeriesWriter(contextlib.AbstractContextManager["SeriesWriter"]):
         self._write_times([*self._times, time])
         self._before = None
         return step  # type: ignore[no-any-return]
-
-    def checked_time(self, time: float | None) -> float:
-        """Return the next step's time, or raise what :meth:`append` would raise for it."""
-        if self._lock is None:
-            raise VDIFileError(
-                f"{self.path} is closed: no step can be appended; make another SeriesWriter with "
-                "append=True to continue"
-            )
-        value = float(len(self)) if time is None else checked_time(time)
-        if self._times and not value > self._times[-1]:
-            raise InvalidArgumentError(
-                f"times must ascend; got {value} after {self._times[-1]}, that of the last step"
-            )
-        return value
 
     def _write_times(self, times: list[float]) -> None:
         with whole_file(self.path / SERIES.head) as stream:

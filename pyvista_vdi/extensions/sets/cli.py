@@ -9,8 +9,6 @@ from pathlib import Path
 from pyvista_vdi.cli.generate import generating_view, say_vdi
 from pyvista_vdi.cli.inputs import classification, given, read_volume
 from pyvista_vdi.extensions.sets.generate import generate_set
-from pyvista_vdi.model.arguments import records_of
-from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 from pyvista_vdi.plotting.progress import DelayedBar
@@ -20,7 +18,6 @@ def generate(options: argparse.Namespace) -> int:
     """Generate a set of VDIs and write it."""
     target = check_writable(with_suffix(Path(options.output), (".vdiset",), "a set"))
     look, how = classification(options), given(options, GenerationOptions)
-    records_of(look, "set", Classification)  # refused before the volume is read
     volume = read_volume(options)
     asked = {n: getattr(options, n) for n in ("views", "half_angle", "lists", "device")}
     how |= {name: value for name, value in asked.items() if value is not None}

@@ -81,7 +81,7 @@ def seen_of(shown: Shown, *, camera: Any = None, time: float | None = None, **lo
 
 def file_of(
     shown: Shown,
-    precision: str = "8-byte",
+    precision: str | None = None,
     level: int | None = None,
     *,
     seen: VDI | None = None,
@@ -89,9 +89,10 @@ def file_of(
 ) -> tuple[bytes, int]:
     """Return the file of what is shown, and how many bytes of it give a first picture.
 
-    ``seen``: of values those with the colours that editing begins with.
+    ``precision`` is "8-byte" by default. ``seen``: of values those with the colours that editing
+    begins with.
     """
-    stream = io.BytesIO()
+    stream, precision = io.BytesIO(), precision or "8-byte"
     if isinstance(shown, VDISeries | VDISet):
         options: Any = {"precision": precision, "compression": DEFLATE, "level": level}
         first = write_several(stream, shown, progress=progress, **options)
@@ -113,7 +114,7 @@ def bare_file(vdi: VDI) -> bytes:
 
     A table of 4096 colours would be longer than a small VDI.
     """
-    bare = copy.copy(vdi.with_precision("8-byte"))
+    bare = copy.copy(vdi)
     bare.metadata = {}
     return file_of(bare, level=EFFORT)[0]
 
