@@ -70,12 +70,6 @@ class Box(Algorithm):
             self.SetInputConnection(port)
             self.place(None)  # what fails from the first has no bounds either
 
-    def give_components(self, components: int) -> None:
-        """Set the voxels' components: VTK asks for four where they are dependent."""
-        if components != self.components:
-            self.components = components
-            self._allocate()
-
     def place(self, bounds: tuple[float, ...] | None) -> None:
         """Set the bounds, model frame; ``None``: none."""
         extent = _EMPTY if bounds is None else _EXTENT
@@ -101,6 +95,11 @@ class Box(Algorithm):
             self.place((0, 1, 0, 1, 0, 1))
         if actor is None:
             return
+        # VTK asks for four where the actor's property says that they are dependent
+        components = 1 if actor.GetProperty().GetIndependentComponents() else 4
+        if components != self.components:
+            self.components = components
+            self._allocate()
         model, matrix = bounds_corners(self.image.GetBounds()), as_array(actor.GetMatrix())
         # From the origin of the model frame, or of the world
         far = any(

@@ -15,7 +15,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.view import bounds_corners
-from pyvista_vdi.quality.costs import RenderMode
+from pyvista_vdi.quality.plan import RenderMode
 from pyvista_vdi.quality.view_error import angle_from_generating_view
 from pyvista_vdi.vtk_pipeline.drawing.window import Window
 from pyvista_vdi.vtk_pipeline.filters.view import View, as_array, camera_of, size_of
@@ -102,11 +102,6 @@ class Frame:
             view = View(camera, size)
         of = (renderer, Window.of(renderer.GetRenderWindow()), actor, mapper, size, view, matrix)
         return cls(size, (x, y), camera, to_view, projection[2:], *of)
-
-    @property
-    def seen_from(self) -> tuple[Any, tuple[int, int], Matrix]:
-        """What the renderer sees the actor by: its camera, its size and the actor's matrix."""
-        return self.renderer.GetActiveCamera(), size_of(self.renderer), self.model_transform
 
     def showing(self, seen: Any, **known: Any) -> Frame:
         """Return the frame of this VDI, or volume, with all that its mapper says of its looks."""

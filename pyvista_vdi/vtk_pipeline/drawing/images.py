@@ -13,7 +13,7 @@ from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.options import FrameRequest
-from pyvista_vdi.quality.costs import RenderMode
+from pyvista_vdi.quality.plan import RenderMode
 from pyvista_vdi.raycasting.multi_vdi import blended
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume

@@ -13,74 +13,61 @@ from numpy.typing import NDArray
 from pyvista_vdi.vtk_pipeline.vtk import VTK_FLOAT, vtkTextureObject
 
 
-class _Texture:
-    """A texture that is made when it is first shown, and filled again in another window."""
+class Textures:
+    """The image that the shader of an actor looks up, and a depth of one texel beside it.
+
+    VTK's volume mapper copies the whole depth buffer in each frame, for the ray caster that our
+    shader replaces: under MSAA that takes longer than to draw the image. The texel is in its place.
+    """
 
     def __init__(self) -> None:
-        self._texture: Any = None
+        self._image, self._depth = vtkTextureObject(), vtkTextureObject()
+        self._uploaded: NDArray[np.float32] | None = None
+        for texture in (self._image, self._depth):
+            texture.SetWrapS(vtkTextureObject.ClampToEdge)
+            texture.SetWrapT(vtkTextureObject.ClampToEdge)
 
-    def _in_context(self, window: Any) -> bool:
-        """Bind the texture to a window's current context; return whether it is filled there."""
-        if self._texture is None:
-            self._texture = vtkTextureObject()
-            self._texture.SetWrapS(vtkTextureObject.ClampToEdge)
-            self._texture.SetWrapT(vtkTextureObject.ClampToEdge)
-        if self._texture.GetContext() is not window:
-            self._texture.SetContext(window)
-            return False
-        return bool(self._texture.GetHandle() != 0)
-
-    def let_go(self) -> None:
-        """Release the texture unit."""
-        if self._texture is not None:
-            self._texture.Deactivate()
-
-    def release(self) -> None:
-        """Free it, for the next frame to fill it anew."""
-        window = None if self._texture is None else self._texture.GetContext()
-        if window is not None:
-            self._texture.ReleaseGraphicsResources(window)
-
-
-class ImageTexture(_Texture):
-    """The image that the shader of an actor looks up."""
-
-    _uploaded: NDArray[np.float32] | None = None
-
-    def show(self, window: Any, image: NDArray[np.float32], *, smooth: bool) -> int:
+    def show(self, window: Any, mapper: Any, image: NDArray[np.float32], *, smooth: bool) -> int:
         """Bind an image for the shader, in the window's context; return its texture unit.
 
         ``image`` is RGBA, float32 (H, W, 4), its rows in the order that the shader takes them in.
         The same object as last time is not uploaded again. With ``smooth`` texels are interpolated
         linearly: a full frame's texels are the pixels.
         """
-        filled = self._in_context(window)
-        texture = self._texture
+        filled = _filled(self._image, window)
         kind = vtkTextureObject.Linear if smooth else vtkTextureObject.Nearest
-        texture.SetMinificationFilter(kind)
-        texture.SetMagnificationFilter(kind)
+        self._image.SetMinificationFilter(kind)
+        self._image.SetMagnificationFilter(kind)
         if not filled or image is not self._uploaded:
             height, width = image.shape[:2]
-            texture.Create2DFromRaw(width, height, 4, VTK_FLOAT, image)
+            self._image.Create2DFromRaw(width, height, 4, VTK_FLOAT, image)
             self._uploaded = image
-        texture.Activate()
-        return int(texture.GetTextureUnit())
-
-
-class NoDepth(_Texture):
-    """A depth texture of one texel, in place of the copy of the depth buffer that VTK would make.
-
-    VTK's volume mapper copies the whole depth buffer in each frame, for the ray caster that our
-    shader replaces: under MSAA that takes longer than to draw the image.
-    """
-
-    def show(self, window: Any, mapper: Any) -> None:
-        """Bind it for a mapper in the frame that begins; the image's texture is active already."""
-        if not self._in_context(window):
+        self._image.Activate()
+        if not _filled(self._depth, window):
             far = np.ones(1, dtype=np.float32)  # window depth of nothing
-            self._texture.CreateDepthFromRaw(1, 1, vtkTextureObject.Float32, VTK_FLOAT, far)
-        mapper.SetSharedDepthTexture(self._texture)
-        self._texture.Activate()
+            self._depth.CreateDepthFromRaw(1, 1, vtkTextureObject.Float32, VTK_FLOAT, far)
+        mapper.SetSharedDepthTexture(self._depth)
+        self._depth.Activate()
+        return int(self._image.GetTextureUnit())
+
+    def let_go(self) -> None:
+        """Release the texture units."""
+        self._image.Deactivate()
+        self._depth.Deactivate()
+
+    def release(self) -> None:
+        """Free them, for the next frame to fill them anew."""
+        for texture in (self._image, self._depth):
+            if texture.GetContext() is not None:
+                texture.ReleaseGraphicsResources(texture.GetContext())
+
+
+def _filled(texture: vtkTextureObject, window: Any) -> bool:
+    """Bind a texture to a window's current context; return whether it is filled there."""
+    if texture.GetContext() is not window:
+        texture.SetContext(window)
+        return False
+    return bool(texture.GetHandle() != 0)
 
 
 #: Where the viewport is in the framebuffer, pixels: left edge, upper edge, 1 / width, -1 / height.
