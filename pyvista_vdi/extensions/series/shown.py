@@ -57,7 +57,7 @@ class SeveralInput(Input):
     def on_devices(self) -> list[Any]:
         """Return the VDIs that are ready, and what was classified of that which is shown."""
         with self._lock:
-            return [self._vdi, *self._ready.values()]
+            return [self.last, *self._ready.values()]
 
     def rest(self) -> None:
         """Leave no thread; the next frame may begin anew."""
@@ -170,8 +170,8 @@ class SeriesInput(SeveralInput):
             if self._kept is None or (self._kept.deferred, self._kept.prop) != (step, self.prop):
                 self._kept = DeferredInput(step, self.prop)
             step = self._kept.vdi()
-        self._vdi = as_vdi(step)  # refuses what has no colours
-        return self._vdi
+        self.last = as_vdi(step)  # refuses what has no colours
+        return self.last
 
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
@@ -181,7 +181,7 @@ class SeriesInput(SeveralInput):
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds of the step that was shown last, or of the first."""
-        return self.collection.bounds if self._vdi is None else self._vdi.bounds
+        return self.collection.bounds if self.last is None else self.last.bounds
 
     def stamp(self) -> Any:
         """Return the step, and the time stamp of what classifies it."""

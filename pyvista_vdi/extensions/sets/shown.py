@@ -29,8 +29,8 @@ class SetInput(SeveralInput):
 
     def vdi(self) -> VDI | None:
         """Return the nearest VDI, read now if it is not ready."""
-        self._vdi = self._seen(self._weights[0][0])
-        return self._vdi
+        self.last = self._seen(self._weights[0][0])
+        return self.last
 
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
@@ -54,7 +54,7 @@ class SetInput(SeveralInput):
 
     def on_devices(self) -> list[Any]:
         """Return the VDIs that are ready, and what was classified of those that are drawn."""
-        return [*super().on_devices(), *(one.last() for one in self._kept.values())]
+        return [*super().on_devices(), *(one.last for one in self._kept.values())]
 
     def look(self, camera: Camera, device: Any) -> None:
         """Choose what a view shows, and read what is near it."""

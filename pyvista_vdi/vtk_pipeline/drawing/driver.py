@@ -47,19 +47,18 @@ from pyvista_vdi.quality.view_error import (
 )
 from pyvista_vdi.raycasting.picking import FirstHit, Pick, pick_vdi
 from pyvista_vdi.raycasting.prepared import release_from_devices
-from pyvista_vdi.vtk_pipeline.drawing.box import Box
-from pyvista_vdi.vtk_pipeline.drawing.depth import opaque_depth
 from pyvista_vdi.vtk_pipeline.drawing.frame import (
     Frame,
     Matrix,
     consumers,
+    opaque_depth,
     planes_of,
     tiled,
     viewport,
 )
 from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Drawn, VolumePicture, raycast
 from pyvista_vdi.vtk_pipeline.drawing.overlap import group_of
-from pyvista_vdi.vtk_pipeline.drawing.screen import Textures, place_image
+from pyvista_vdi.vtk_pipeline.drawing.screen import Box, Textures, place_image
 from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
 from pyvista_vdi.vtk_pipeline.drawing.window import Timer, VDIStatus, Window, now
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
@@ -221,7 +220,8 @@ class Driver:
         share = 1 / self.settings.image_distance**2
         for size in dict.fromkeys((reduced(frame.full_size, share), self.preview_size(frame))):
             sized = frame.coarser(size)
-            if self._last.shows(sized):
+            a, b = self._last.depth, sized.depth  # by their keys both have one, or neither has
+            if self._last.key == sized.key and (a is None or b is None or np.array_equal(a, b)):
                 return self._last
         # Raycast, and note what that took
         began = now()
@@ -330,14 +330,14 @@ class Driver:
                         failed=self._stamp in self.failed,
                     )
         except Cancelled as error:
-            if self._volume is None and source.last() is None:
+            if self._volume is None and source.last is None:
                 raise
             self._complain(error)
-            planned, shown = Plan("vdi"), self._volume or source.last()
+            planned, shown = Plan("vdi"), self._volume or source.last
         if shown is None:
             return None
         # A volume has the light of its VDI in a window, so that nothing jumps
-        by_vdi = self.seen is not None and source.last() is not None
+        by_vdi = self.seen is not None and source.last is not None
         lit_from = frame.view.camera if not by_vdi or self.settings.draw == "volume" else None
         return frame.showing(shown, lit_from=lit_from, full=planned.full, stand_in=planned.stand_in)
 
@@ -347,7 +347,7 @@ class Driver:
         source.look(frame.view.camera, self.device)
         if stamp is None or stamp not in self.failed:
             self._update(source)
-        vdi = source.last()
+        vdi = source.last
         if vdi is None:
             return None
         if self.settings.regenerate == "auto":
@@ -393,10 +393,10 @@ class Driver:
         elif not moving and first:
             self._moved_at = min(self._moved_at, time - SETTLED)
         settled, self.view = time - self._moved_at >= SETTLED, view
-        if watched and trouble is not None and stamp != self._stamp and source.last() is not None:
+        if watched and trouble is not None and stamp != self._stamp and source.last is not None:
             self._complain(trouble)
         self._stamp = stamp
-        vdi, made_of = source.last(), source.made_of
+        vdi, made_of = source.last, source.made_of
         content, volume, late, each = None, "whole", False, self.costs.volume
         if wanted is not None:
             content = wanted.content
@@ -474,7 +474,7 @@ class Driver:
 
     def _estimate(self, source: VDISource, view: View) -> None:
         """Estimate, in the background, the error of the VDI in a view."""
-        made, request, mapper = source.last(), source.made_of, self.actor().GetMapper()
+        made, request, mapper = source.last, source.made_of, self.actor().GetMapper()
         assert made is not None and request is not None  # noqa: PT018
         planes = np.reshape(planes_of(mapper), (-1, 6))
         options = RenderOptions(planes, mapper, self.settings.opacity_multiplier)
@@ -495,7 +495,7 @@ class Driver:
         assert self._wanted is not None
         _, wanted, trouble = self._wanted
         if planned.show == "vdi":
-            return source.last()
+            return source.last
         if planned.show == "trouble":
             assert trouble is not None
             raise trouble
@@ -552,13 +552,14 @@ class Driver:
 
     def advance(self) -> bool:
         """Take what was made in the background; whether a frame has something new to look at."""
-        try:
-            another = None if self.input is None else self.input.advance()
-        except Exception as error:
-            self._complain(error)
+        if self.input is not None and self.input.playing:
+            try:
+                return bool(self.input.player.advance())
+            except Exception as error:
+                self._complain(error)
+                return False
+        if self._asked is None:
             return False
-        if another is not None or self._asked is None:
-            return bool(another)
         try:
             made = self.worker.take()
         except Exception as error:
@@ -632,19 +633,19 @@ class Driver:
         """
         source, seen = self.input, self._look_for_view()
         if not isinstance(source, VDISource):
-            if source is None or (source.last() is not None and source.prop is None):
-                return None if source is None else source.last()
+            if source is None or (source.last is not None and source.prop is None):
+                return None if source is None else source.last
             return source.vdi()  # in the colours that its property has by now
         if source.has_view:
             # Unless frames keep it up to date, or will
             kept = self.settings.draw == "vdi" or self.making is not None
-            if source.last() is None or not kept:
+            if source.last is None or not kept:
                 self.drop()
                 if source.stamp() not in self.failed:
                     self._update(source)
         elif seen is not None:
             return source.vdi(source.view_for(*seen))
-        return source.last()
+        return source.last
 
     def values_asked_for(self) -> DeferredVDI | None:
         """Return the values that are classified, made now if they are not.
@@ -667,14 +668,14 @@ class Driver:
         if isinstance(source, VDISource):
             return seen
         source.set_view_if_missing(*seen)
-        if source.last() is None:
+        if source.last is None:
             source.look(camera_of(seen[0], matrix), self.device)
         return seen
 
     def status(self) -> VDIStatus:
         """Return how the last frame was drawn, and what goes on."""
         last, view, window = self._last, self.view, self._window()
-        vdi = None if self.input is None else self.input.last()
+        vdi = None if self.input is None else self.input.last
         player = None if self.input is None else self.input.player
         shown = None if vdi is None or view is None else (vdi, view.camera, view.size)
         known = None if vdi is None else self.estimate

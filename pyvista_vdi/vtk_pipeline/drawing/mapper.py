@@ -86,7 +86,7 @@ class VDIMapperMethods:
         source = self.driver.input
         if source is None:
             return None
-        return source.last() if isinstance(source, VDISource) else source.vdi()
+        return source.last if isinstance(source, VDISource) else source.vdi()
 
     def GetSource(self) -> VDISource | None:
         """Return the :class:`VDISource` at the input, if it is one."""
