@@ -64,8 +64,8 @@ class SeveralInput(Input):
 
     def vdi(self) -> VDI:
         """Return the VDI that is shown, read now if it is not ready."""
-        self._vdi = self._seen(self._weights[0][0])
-        return self._vdi
+        self.last = self._seen(self._weights[0][0])
+        return self.last
 
     @property
     def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
@@ -75,7 +75,7 @@ class SeveralInput(Input):
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds of the VDI that was shown last, or of the first."""
-        return self.collection.bounds if self._vdi is None else self._vdi.bounds
+        return self.collection.bounds if self.last is None else self.last.bounds
 
     def stamp(self) -> Any:
         """Return which VDI is shown, and the time stamp of what classifies it."""
@@ -85,7 +85,7 @@ class SeveralInput(Input):
         """Return the VDIs that are ready, and what was classified of those that are shown."""
         with self._lock:
             ready = [*self._ready.values()]
-        return [self._vdi, *ready, *(one.last() for one in self._kept.values())]
+        return [self.last, *ready, *(one.last for one in self._kept.values())]
 
     def rest(self) -> None:
         """Leave no thread; the next frame may begin anew."""

@@ -178,7 +178,7 @@ def as_numpy(array: vtk.vtkDataArray) -> NDArray[Any]:
         plain.DeepCopy(array)
         return vtk.vtk_to_numpy(plain)  # type: ignore[no-any-return]
     values: NDArray[Any] = vtk.vtk_to_numpy(array)
-    # NumPy's own array rather than one that keeps VTK's, which has an attribute: see HeldByVTK
+    # NumPy's own array rather than one that keeps VTK's, which has an attribute: see held_by_vtk
     lent = getattr(array, "_numpy_reference", values)
     theirs, ours = ((a.dtype, a.size, a.ctypes.data) for a in (lent, values))
     return lent.reshape(values.shape) if theirs == ours else values
