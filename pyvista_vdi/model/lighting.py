@@ -40,7 +40,7 @@ class Shading:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).copy().items():
-            object.__setattr__(self, name, Number("0 or above", name=name)(value))
+            object.__setattr__(self, name, Number(name=name)(value))
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Light:
         put = object.__setattr__
         for name in ("position", "focal_point", "ambient", "diffuse", "specular", "attenuation"):
             put(self, name, as_vector(getattr(self, name), f"a light's {name}"))
-        finite = Number("a finite number", -math.inf, open_ended=True)
+        finite = Number(low=-math.inf, open_ended=True)
         for name in ("cone_angle", "exponent", "intensity"):
             put(self, name, replace(finite, name=f"a light's {name}")(getattr(self, name)))
         put(self, "positional", as_flag(self.positional, "a light's positional"))

@@ -16,7 +16,7 @@ from pyvista_vdi.model.lighting import Shading
 #: Optical depth that a fully opaque sample gets per step: exp(-30) is 1e-13, nothing passes.
 OPAQUE_OPTICAL_DEPTH = 30.0
 
-_UNIT = Number("a positive length in model units", open_ended=True, name="unit_distance", none=True)
+_UNIT = Number("a length in model units", open_ended=True, name="unit_distance", none=True)
 
 #: Share of a volume's scalar range beyond which VTK tells no gradient magnitudes apart.
 GRADIENT_SHARE = 0.25

@@ -125,11 +125,11 @@ class InSitu(AbstractContextManager["InSitu"]):
         self._writer: SeriesWriter | None = None
         self.seconds: list[float] = []
         with together(comm, "InSitu", InvalidArgumentError):
-            steps = Number("a whole number of steps from 1", 1, whole=True, name="every")
+            steps = Number("a whole number of steps", 1, whole=True, name="every")
             self._every = steps(every)
             self._camera = Camera.from_any(camera)
             self._size = check_window_size(window_size)
-            count = Number("three whole numbers of points from 2", 2, whole=True, name="dimensions")
+            count = Number("three whole numbers of points", 2, whole=True, name="dimensions")
             x, y, z = map(count, as_vector(dimensions, "dimensions"))
             of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
             self._grid = asdict(Grid((x, y, z), of.spacing, of.origin, of.direction))

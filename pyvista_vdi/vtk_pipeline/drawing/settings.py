@@ -49,7 +49,7 @@ SETTINGS: Mapping[str, Option] = {
         1.0,
         "for how many pixels along each edge a ray is cast, 1 to 100",
         "The picture is interpolated linearly, as by VTK's mappers.",
-        check=Number("a number from 1 to 100", 1, 100, name="the image sample distance"),
+        check=Number(low=1, high=100, name="the image sample distance"),
     ),
     "AutoAdjustSampleDistances": Option(
         "adjust",
