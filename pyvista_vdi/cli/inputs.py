@@ -17,7 +17,7 @@ from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.volumes.in_file import placed
 from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.classification import Look
+from pyvista_vdi.model.classification import Classification, Look
 from pyvista_vdi.model.inputs import as_volume
 from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.transfer_function import TransferFunction
@@ -47,12 +47,16 @@ def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dic
 
 
 def classification(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments that say how the volume looks; which array it is, the volume says."""
+    """Return the arguments that say how the volume looks; which array it is, the volume says.
+
+    What cannot be is refused now, before the volume is read.
+    """
     found = given(options, Look)
     path = getattr(options, "transfer_function", None)
     if path is not None:
         function = from_json(path, TransferFunction.from_dict, "transfer function")
         found["transfer_function"] = function
+    Classification(**found)
     return found
 
 
@@ -128,7 +132,8 @@ def volume_name(options: argparse.Namespace) -> str:
 def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterator[dict[str, Path]]:
     """Yield where ``--out`` has the files go, after finding that they can be written there.
 
-    A folder that is made for them, and into which nothing is written, is gone again.
+    They are named when they are written. A folder that is made for them, and into which nothing is
+    written, is gone again.
     """
     folder = Path(options.out)
     made = not folder.exists()
@@ -139,17 +144,14 @@ def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterato
             f"the folder {folder} cannot be made: {error.strerror}; choose another --out"
         ) from error
     try:
-        yield {kind: check_writable(folder / f"{stem}.{kind}") for kind in kinds}
+        files = {kind: check_writable(folder / f"{stem}.{kind}") for kind in kinds}
+        yield files
     except BaseException:
         if made:
             with suppress(OSError):  # something is there
                 folder.rmdir()
         raise
-
-
-def say_written(files: Iterable[Path | str]) -> None:
-    """Name the files that were written."""
-    print("Written: " + ", ".join(printable(path) for path in files))
+    print("Written: " + ", ".join(map(printable, files.values())))
 
 
 def camera(options: argparse.Namespace, default: Camera) -> Camera:

@@ -22,9 +22,9 @@ from pyvista_vdi.model.volume import Grid
 _LEAST_STEPS = 8
 
 _CHECKS = {
-    "radius": Number("a positive length in model units", open_ended=True, none=True),
-    "strength": Number("from 0 to 1", 0, 1),
-    "directions": Number("a whole number from 12 to 4096", 12, 4096, whole=True),
+    "radius": Number("a length in model units", open_ended=True, none=True),
+    "strength": Number(high=1),
+    "directions": Number(low=12, high=4096, whole=True),
 }
 
 

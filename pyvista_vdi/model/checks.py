@@ -46,12 +46,12 @@ def as_flag(value: Any, name: str) -> bool:
 class Number:
     """A check of a number from ``low`` to ``high``, finite; without these if ``open_ended``.
 
-    ``wanted`` says so in an error. ``whole``: whether it is a whole number; ``none``: whether None
-    passes.
+    ``of`` says in an error what it is a number of. ``whole``: whether it is a whole number;
+    ``none``: whether None passes.
     """
 
-    wanted: str
-    low: float = 0.0
+    of: str = ""
+    low: float = 0
     high: float = math.inf
     whole: bool = False
     open_ended: bool = False
@@ -65,8 +65,14 @@ class Number:
         number = as_whole(value) if self.whole else as_number(value)
         at_end = number in (self.low, self.high) and self.open_ended
         if not self.low <= number <= self.high or number == math.inf or at_end:
+            wanted = self.of or ("a whole number" if self.whole else "a finite number")
+            if self.high < math.inf:
+                ends = " between {} and {}" if self.open_ended else " from {} to {}"
+                wanted += ends.format(self.low, self.high)
+            elif self.low > -math.inf:
+                wanted += f" above {self.low}" if self.open_ended else f", {self.low} or above"
             error = InvalidArgumentTypeError if math.isnan(number) else InvalidArgumentError
-            raise error(f"{name or self.name} must be {self.wanted}; got {value!r}")
+            raise error(f"{name or self.name} must be {wanted}; got {value!r}")
         return int(number) if self.whole else number
 
 

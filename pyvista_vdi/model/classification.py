@@ -97,7 +97,7 @@ class Look(Options):
         256,
         "entries of the colour map",
         # Building more takes PyVista time by the square, some seconds here
-        check=Number("a whole number from 1 to 16384", 1, 16384, whole=True),
+        check=Number(low=1, high=16384, whole=True),
     )
     opacity: OpacityLike = option(
         "linear",
@@ -111,7 +111,7 @@ class Look(Options):
         None,
         "length over which opacities are reached, model units; the volume's diagonal over its mean "
         "number of cells by default",
-        check=Number("a positive length in model units", open_ended=True),
+        check=Number("a length in model units", open_ended=True),
     )
     log_scale: bool = option(False, "map values to colours by their logarithm")
     shade: bool = option(

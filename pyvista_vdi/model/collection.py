@@ -25,11 +25,10 @@ class VDICollection(Sequence[VDI]):
     """
 
     times: tuple[float, ...] | None = None
-
-    @property
-    @abstractmethod
-    def camera(self) -> Camera:
-        """The view to begin with."""
+    #: The view to begin with.
+    camera: Camera
+    #: Returns it with what a function makes of each VDI, when that is asked for.
+    _mapped: Callable[[Callable[[VDI], VDI]], Any]
 
     @abstractmethod
     def nearest(self, at: Any) -> int:
@@ -54,10 +53,6 @@ class VDICollection(Sequence[VDI]):
         VDI is made when it is asked for. InvalidVDIError if they have colours.
         """
         return registry.method("DeferredVDI.classified")(self, look)  # type: ignore[no-any-return]
-
-    def _mapped(self: _Collection, function: Callable[[VDI], VDI]) -> _Collection:
-        """Return it with what a function makes of each VDI, when that is asked for."""
-        raise NotImplementedError
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write all in one file that `pyvista_vdi.read` opens, or a page, whole or not at all.

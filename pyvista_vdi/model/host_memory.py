@@ -39,15 +39,11 @@ class GrowingArray:
 
     def reserve(self, n: int, most: int) -> None:
         """Make room for at least n elements (MemoryError), for the most if it can be had."""
-        for room in (most, 2 * n, n):
-            if n <= len(self.array):
-                return
+        if n > len(self.array):
             try:
-                larger = aligned_empty((room, *self._item), np.float32)
+                larger = aligned_empty((most, *self._item), np.float32)
             except MemoryError:
-                if room == n:
-                    raise
-                continue
+                larger = aligned_empty((2 * n, *self._item), np.float32)
             larger[: len(self.array)] = self.array
             self.array = larger
 

@@ -38,7 +38,7 @@ class Shading:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).copy().items():
-            object.__setattr__(self, name, Number("0 or above")(value, name))
+            object.__setattr__(self, name, Number()(value, name))
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Light:
         put = object.__setattr__
         for name in ("position", "focal_point", "ambient", "diffuse", "specular", "attenuation"):
             put(self, name, as_vector(getattr(self, name), f"a light's {name}"))
-        finite = Number("a finite number", -math.inf, open_ended=True)
+        finite = Number(low=-math.inf, open_ended=True)
         for name in ("cone_angle", "exponent", "intensity"):
             put(self, name, finite(getattr(self, name), f"a light's {name}"))
         put(self, "positional", as_flag(self.positional, "a light's positional"))

@@ -71,7 +71,7 @@ QUALITIES: dict[str, float | None] = {
 _INDISTINGUISHABLE = 1e-6
 
 #: What may be said of bytes.
-_BYTES = Number("a whole number of bytes above 0", 1, whole=True)
+_BYTES = Number("a whole number of bytes", 1, whole=True)
 
 _Record = TypeVar("_Record", bound="Options")
 
@@ -220,7 +220,7 @@ class MediumOptions(Options):
     sample_distance: float | None = option(
         None,
         "length of a step along a ray, model units; half the smallest spacing by default",
-        check=Number("a positive length in model units", open_ended=True),
+        check=Number("a length in model units", open_ended=True),
         setting=True,
     )
     lights: Lights = option(
@@ -262,9 +262,7 @@ class GenerationOptions(MediumOptions):
         20,
         f"longest list, 1 to {MAX_SUPERSEGMENTS}",
         "A promise: never exceeded, and nothing that is not transparent is dropped for it.",
-        check=Number(
-            f"a whole number from 1 to {MAX_SUPERSEGMENTS}", 1, MAX_SUPERSEGMENTS, whole=True
-        ),
+        check=Number(low=1, high=MAX_SUPERSEGMENTS, whole=True),
     )
     criterion: Criterion = option(
         "least-error",
@@ -278,7 +276,7 @@ class GenerationOptions(MediumOptions):
         0.0,
         "error that may be traded for shorter lists",
         "Per voxel, in opacity-weighted colour and opacity. 0 merges only what is homogeneous.",
-        check=Number("a number >= 0"),
+        check=Number(),
         setting=True,
     )
     view_cone: float = option(
@@ -286,7 +284,7 @@ class GenerationOptions(MediumOptions):
         "half angle of the cone of new views that must be served, degrees",
         "The wider, the more of the budget goes to what the generating view cannot see: "
         "``1 - cos(view_cone)`` of what the seen counts.",
-        check=Number("an angle between 0 and 90 degrees", 0, 90),
+        check=Number("an angle in degrees", high=90),
         setting=True,
     )
     precision: Precision = option(
@@ -372,13 +370,13 @@ class QualityTarget(Options):
         None,
         "SSIM that pictures are to have, 0 to 1",
         "In place of ``quality``: 30 degrees from V_O, against volume rendering.",
-        check=Number("an SSIM between 0 and 1", 0, 1, open_ended=True),
+        check=Number("an SSIM", high=1, open_ended=True),
     )
     full_fps: float | None = option(
         None,
         "least rate of still frames, per second",
         "Predicted for this device. Goes before quality.",
-        check=Number("frames per second above 0", open_ended=True),
+        check=Number("frames per second", open_ended=True),
     )
     max_bytes: int | None = option(
         None,
@@ -467,26 +465,21 @@ class RenderOptions(Options):
         1.0,
         "factor of the extinction, 0 or above",
         "2 is twice as dense, as by half of the opacity unit distance.",
-        check=Number("a finite factor of the extinction, 0 (transparent) or above"),
+        check=Number("a factor of the extinction"),
     )
     preview_samples: int | None = option(
         None,
         "look a VDI up at so many points of each ray",
         "An approximation (paper section 5); a smaller ``window_size`` is the better one. For a "
         "single VDI only.",
-        check=Number(
-            f"a whole number from 1 to {MAX_PREVIEW_SAMPLES}", 1, MAX_PREVIEW_SAMPLES, whole=True
-        ),
+        check=Number(low=1, high=MAX_PREVIEW_SAMPLES, whole=True),
     )
     transmittance_cutoff: float = option(
         TRANSMITTANCE_CUTOFF,
         "a ray ends where less light than this is left, 0 to below 1",
         "No channel loses more: 0.004 changes a picture of 8 bits by one step at most, and saves a "
         "fifth to two fifths of the work where things are opaque. For a single VDI only.",
-        check=Number(
-            "a number from 0 to below 1, such as 0.004 for a difference of 1/255 at most",
-            high=np.nextafter(1.0, 0.0),
-        ),
+        check=Number("a share of the light", high=np.nextafter(1.0, 0.0)),
         setting=True,
     )
     skip_empty: bool = True
@@ -530,7 +523,7 @@ class DrawingOptions(Options):
         "frames per second to be kept while the view moves",
         "By drawing fewer pixels. ``None``: the interactor's ``DesiredUpdateRate``, as for VTK's "
         "own levels of detail; 0: every frame is full.",
-        check=Number("a number of frames per second, 0 or above"),
+        check=Number("frames per second"),
     )
     regenerate: Policy = option(
         "auto",
@@ -545,7 +538,7 @@ class DrawingOptions(Options):
         "estimated SSIM, 0 to 1, below which a VDI does not do for a view",
         '``regenerate="auto"`` makes another, by default below 0.95, and ``draw="auto"`` draws the '
         "volume in its place, by default below 0.98.",
-        check=Number("an SSIM between 0 and 1", 0, 1),
+        check=Number("an SSIM", high=1),
         setting=True,
     )
     draw: Draw = option(

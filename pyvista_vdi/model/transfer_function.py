@@ -93,7 +93,7 @@ class TransferFunction:
                 f"got {self.scalar_range!r}"
             )
         put(self, "scalar_range", (low, high))
-        length = Number("a positive length in model units", open_ended=True, none=True)
+        length = Number("a length in model units", open_ended=True, none=True)
         put(self, "unit_distance", length(self.unit_distance, "unit_distance"))
         one_of(self.interpolation, "interpolation", ("nearest", "linear"))
         if not isinstance(self.shading, Shading | None):

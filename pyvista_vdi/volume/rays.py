@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.device.constants import BLOCK_RAYS, GROUP
@@ -17,7 +16,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.float32_limits import ENTRY_PER_POINT, FAR_ENTRY, MOST_STEPS, NEAR_ENTRY
 from pyvista_vdi.model.options import Planes
-from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed
+from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle
 from pyvista_vdi.model.volume import Grid
 
 Ends = tuple[float, float, float]
@@ -56,10 +55,6 @@ class MarchForms:
     rays: PixelRays
     planes: int
     double_float: bool
-
-    def packed(self, *more: Floats) -> NDArray[np.float32]:
-        """Return the forms, and more of the same rays, as the kernels read them."""
-        return packed([*self.forms, *more])
 
 
 @dataclass(frozen=True)

@@ -115,7 +115,7 @@ def page(
     size = seen.window_size if "screen" in seen.metadata else seen.picture_size
     size = shown.window_size if isinstance(shown, VDISet) else size
     color = f"rgb({percents})"
-    file = file_of(shown, precision or "8-byte", level, seen=seen, progress=progress)
+    file = file_of(shown, precision, level, seen=seen, progress=progress)
     how = {"title": title, "background": color, "autoplay": autoplay}
     return page_of(file, still.astype(np.uint8), size, **how).encode()  # type: ignore[arg-type]
 

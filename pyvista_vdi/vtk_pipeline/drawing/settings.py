@@ -28,15 +28,10 @@ class MapperSettings:
     regenerate_below: float | None = None
     opacity_multiplier: float = 1.0
     transmittance_cutoff: float = TRANSMITTANCE_CUTOFF
-    target_fps: float | None = None  # the window's desired update rate
+    target_fps: float | None = None  # the window's desired update rate; 0: no previews
     image_distance: float = 1.0
     adjust: bool = True
     off_screen: bool = False
-
-    @property
-    def previews(self) -> bool:
-        """Whether a frame of a motion may have fewer rays."""
-        return self.adjust and self.target_fps != 0
 
 
 _DECLARED = declared(RenderOptions, DrawingOptions)
@@ -54,7 +49,7 @@ SETTINGS: Mapping[str, Option] = {
         1.0,
         "for how many pixels along each edge a ray is cast, 1 to 100",
         "The picture is interpolated linearly, as by VTK's mappers.",
-        check=Number("a number from 1 to 100", 1, 100, name="the image sample distance"),
+        check=Number(low=1, high=100, name="the image sample distance"),
     ),
     "AutoAdjustSampleDistances": Option(
         "adjust",
