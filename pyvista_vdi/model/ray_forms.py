@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.camera import Camera, unit
 from pyvista_vdi.model.checks import as_floats
-from pyvista_vdi.model.cropping import Cropping
+from pyvista_vdi.model.cropping import AXES, Cropping
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.view import bounds_corners, projected
 
@@ -140,9 +140,7 @@ def inverse_affine(matrix: Floats) -> Floats:
     return inverse
 
 
-def box_planes(
-    rays: PixelRays, bounds: ArrayLike, normals: ArrayLike = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
-) -> Floats:
+def box_planes(rays: PixelRays, bounds: ArrayLike, normals: ArrayLike = AXES) -> Floats:
     """Return the six forms that keep what is inside bounds along normals of the model frame."""
     low, high = np.reshape(bounds, (3, 2)).T
     rows = np.column_stack([normals, -low]), np.column_stack([np.negative(normals), high])
