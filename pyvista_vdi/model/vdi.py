@@ -24,9 +24,6 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 #: What of a camera differs between a view on the screen and one that covers all of a volume.
 LENS = ("view_angle", "use_horizontal_view_angle", "parallel_scale", "window_center")
 
-#: Straight colours and optical depths of supersegments.
-Media = tuple[NDArray[np.float32], NDArray[np.float32]]
-
 #: Cells of the tables that a transfer function is integrated in, over the range of values: a window
 #: of a fiftieth of it has 327.
 CELLS = 1 << 14
