@@ -40,13 +40,12 @@ def test_slices_make_the_same_vdi_however_memory_is_had(monkeypatch, runtime, ma
     else:  # no room for all that there may be: arrays grow, and move
 
         def limited(array, n, most):
-            array = with_room(array, n, 2 * n)
             grown.add(len(array))
-            return array
+            return with_room(array, n, 2 * n)
 
         monkeypatch.setattr(list_arrays, "with_room", limited)
     assert make(camera, **FOUR_ROWS).equals(whole)
-    assert len(grown) >= 2 or runtime.in_place_alignment is None
+    assert len(grown) >= 3 or runtime.in_place_alignment is None
 
 
 @pytest.mark.parametrize("camera", [CAMERA, HALF_BESIDE], ids=["inside", "half beside"])
