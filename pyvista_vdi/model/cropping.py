@@ -107,10 +107,7 @@ class Cropping:
                 planes = np.clip(np.reshape(planes, (3, 2)), low, high) * np.diag(normals)[:, None]
                 planes = planes.ravel()
             return cls(planes, cropping.GetCroppingRegionFlags(), normals)
-        try:
-            parts = list(cropping)
-        except TypeError:
-            parts = [cropping]
+        parts = list(cropping) if np.iterable(cropping) else []
         return cls(*parts) if len(parts) == 2 else cls(cropping)
 
     def parts_of_ray(
@@ -120,7 +117,7 @@ class Cropping:
 
         Of P(t) = origin + t direction in the model frame, float64 (3,), from first to last.
         """
-        planes = np.maximum.accumulate(np.reshape(np.asarray(self.planes), (3, 2)), axis=1)
+        planes = np.maximum.accumulate(np.reshape(self.planes, (3, 2)), axis=1)
         origin, direction = (np.asarray(self.normals) @ along for along in (origin, direction))
         with np.errstate(divide="ignore", invalid="ignore"):  # a plane that is never reached
             t = ((planes - origin[:, None]) / direction[:, None]).ravel()

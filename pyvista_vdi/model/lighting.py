@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera, unit
+from pyvista_vdi.model.camera import Camera, Vector, unit
 from pyvista_vdi.model.checks import Number, as_flag, as_vector, one_of
-
-Vector: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ class Shading:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).copy().items():
-            object.__setattr__(self, name, Number(name=name)(value))
+            object.__setattr__(self, name, Number()(value, name))
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ class Light:
             put(self, name, as_vector(getattr(self, name), f"a light's {name}"))
         finite = Number(low=-math.inf, open_ended=True)
         for name in ("cone_angle", "exponent", "intensity"):
-            put(self, name, replace(finite, name=f"a light's {name}")(getattr(self, name)))
+            put(self, name, finite(getattr(self, name), f"a light's {name}"))
         put(self, "positional", as_flag(self.positional, "a light's positional"))
         if self.kind == "headlight":  # wherever the eye is, it is the same light
             put(self, "position", Light.position)

@@ -1,9 +1,7 @@
-"""Rays as the kernels take them: affine forms of the pixel, in float64 (docs/dev/conventions.md).
+"""Rays as the kernels take them: affine forms of the pixel and of t (``opencl/lib/rays.cl``).
 
-Along the ray of a pixel every quantity that the kernels need (a coordinate, the distance from a
-clipping plane, a homogeneous denominator) is affine in the pixel's position and in t, the view
-depth of the ray's camera less a reference depth. The six numbers of each such form are computed
-here in float64, so that an eye or an origin far away costs the kernels' float32 nothing.
+Their numbers are computed in float64, about the depth at which rays reach the data, so that an eye
+or an origin far away costs the kernels' float32 nothing (docs/dev/conventions.md#rays).
 """
 
 import reprlib
@@ -25,9 +23,6 @@ Floats: TypeAlias = NDArray[np.float64]
 
 #: Depth before which nothing is looked up in perspective, in diagonals of the bounds ("Lengths").
 NEAREST_DEPTH = 1e-6
-
-#: Lengths times reciprocal depths beyond which, or below whose reciprocal, float32 loses digits.
-LARGEST_PRODUCT = 1e36
 
 
 class Rectangle(NamedTuple):
@@ -99,7 +94,7 @@ def nearest_depth(camera: Camera, bounds: Sequence[float]) -> float:
 def check_list_space(camera: Camera, bounds: Sequence[float]) -> None:
     """Refuse a generating view whose lists float32 cannot express (docs/dev/numerics.md).
 
-    Lengths times reciprocal depths leave its range then.
+    Lengths times reciprocal depths leave 1e-36 to 1e36 then, beyond which it loses digits.
     """
     near, far = (1.0, 1.0) if camera.parallel_projection else depth_range(camera, bounds)
     near = max(near, nearest_depth(camera, bounds))
@@ -107,7 +102,7 @@ def check_list_space(camera: Camera, bounds: Sequence[float]) -> None:
     if not (0 < near <= far and diagonal > 0):
         return  # nothing is seen
     products = (1 / near / near, 1 / far / far, diagonal / near / far, diagonal)
-    if min(products) < 1 / LARGEST_PRODUCT or max(products) > LARGEST_PRODUCT:
+    if min(products) < 1e-36 or max(products) > 1e36:
         raise InvalidCameraError(
             f"view depths from {near:.3g} to {far:.3g} world units, of bounds that are "
             f"{diagonal:.3g} model units across, are beyond float32: scale the spacing (or the "
@@ -208,14 +203,10 @@ def direction_forms(rays: PixelRays, window_size: Sequence[int], multiplier: flo
     With that power as their value, see ``model_speed`` of ``lib/list_space.cl``. Slopes are
     about 1 then, and squares of theirs neither overflow nor vanish in float32, whatever the units.
     """
-    forms = np.zeros((3, 6))
-    forms[:, 3:] = multiplier * rays.direction.T
-    reach = np.abs(forms[:, 3:]) @ [1.0, *np.asarray(window_size) / 2]
-    _, exponent = np.frexp(reach.max())
-    scale = np.ldexp(1.0, int(np.clip(exponent, -126, 126)))
-    forms[:, 3:] /= scale
-    forms[:, 0] = scale
-    return forms
+    slopes = multiplier * rays.direction.T
+    _, exponent = np.frexp((np.abs(slopes) @ [1.0, *np.divide(window_size, 2)]).max())
+    power = np.ldexp(1.0, int(np.clip(exponent, -126, 126)))
+    return np.column_stack([np.tile([power, 0, 0], (3, 1)), slopes / power])
 
 
 def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:

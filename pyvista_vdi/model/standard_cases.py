@@ -7,16 +7,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_bounds
 from pyvista_vdi.model.view import bounds_corners
 
 #: Elevation of V_O above the horizontal plane through the centre, degrees.
 ELEVATION = 20.0
-
-#: Distance kept between the outermost corner and the viewport's edge, in half viewports: below a
-#: tenth of a pixel at any usual size, far above rounding.
-_MARGIN = 1e-4
 
 
 def filling_camera(
@@ -32,7 +28,6 @@ def filling_camera(
     ``Azimuth``), and ``elevation`` above the horizontal plane, less than 90 degrees either way, as
     near to the box's centre as all eight corners are inside the viewport.
     """
-    width, height = check_window_size(window_size)
     box = np.array(as_bounds(bounds))
     if not np.any(box[1::2] > box[::2]):
         raise InvalidArgumentError(f"the bounds {box.tolist()} are a point: nothing fills a view")
@@ -46,7 +41,9 @@ def filling_camera(
     # A corner at (x, y, z) from the centre in view axes is inside at distance d of the eye if
     # |x| <= t_x (d + z) and |y| <= t_y (d + z)
     x, y, z = towards.axes @ (bounds_corners(box) - centre).T
-    t_x, t_y = (t * (1 - _MARGIN) for t in towards.half_extent((width, height)))
+    # Between the outermost corner and the viewport's edge is less than a tenth of a pixel at any
+    # usual size, far more than rounding
+    t_x, t_y = (t * (1 - 1e-4) for t in towards.half_extent(window_size))
     with np.errstate(all="ignore"):
         distance = float(np.max(np.maximum(np.abs(x) / t_x, np.abs(y) / t_y) - z))
     return towards.replace(position=centre + to_eye * distance)

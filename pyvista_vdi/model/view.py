@@ -14,19 +14,12 @@ from pyvista_vdi.model.volume import Grid
 #: Most lists that a covering view may have, as a multiple of the window's pixels.
 MAX_LISTS_PER_PIXEL = 4.0
 
-#: Least depth in front of the eye at which a corner can be projected, as a share of the diagonal
-#: of all corners; below it the rectangle on the screen has no useful size.
-_NEAREST = 1e-3
-
 #: A corner this little beyond a pixel's border, in pixels, does not need another row of lists.
 SLACK = 1e-6
 
 #: Rays along an edge of the window that tell what is seen, and by how much of V_O's window a point
 #: may lie outside of it by rounding.
 _RAYS, _COVERAGE_SLACK = 33, 1e-5
-
-#: Edges of a voxel that differ by less are the same.
-_COARSER = 1.01
 
 
 @dataclass(frozen=True)
@@ -161,9 +154,9 @@ def required_level(levels: Sequence[Grid], camera: Camera, window_size: Sequence
     width = min(2 * np.divide(camera.half_extent(window_size), window_size))
     width *= 1.0 if camera.parallel_projection else depth
     to_view = camera.model_to_view[:3, :3]
-    # Distances of neighbouring points along x, y and z, world units
+    # Distances of neighbouring points along x, y and z, world units; what is less than 1 % is none
     edges = [np.linalg.norm(to_view @ each.index_to_model[:3, :3], axis=0) for each in levels]
-    fine = [now[now > _COARSER * edges[0]].max(initial=0) <= width / 2 for now in edges]
+    fine = [now[now > 1.01 * edges[0]].max(initial=0) <= width / 2 for now in edges]
     return fine.index(False) - 1 if False in fine else len(levels) - 1
 
 
@@ -195,12 +188,13 @@ def projected(
 ) -> NDArray[np.float64] | None:
     """Return points in pixels from the window's lower left corner.
 
-    None if one is behind the eye or closer than a thousandth of all points' diagonal.
+    None if one is behind the eye or closer than a thousandth of all points' diagonal, where what
+    they cover on the screen has no useful size.
     """
     u, v, depth, d = in_viewport(camera, window_size, corners)
     if not camera.parallel_projection:
         world = corners @ camera.model_transform[:3, :3].T
         diagonal = float(np.linalg.norm(np.ptp(world, axis=0)))
-        if depth.min() <= _NEAREST * diagonal:
+        if depth.min() <= 1e-3 * diagonal:
             return None
     return np.asarray((np.stack([u / d, v / d], axis=1) + 1) / 2 * window_size)

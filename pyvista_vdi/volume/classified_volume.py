@@ -129,7 +129,7 @@ class DeviceVolume:
             kept = uploads_of(volume).kept
             blanked = kept(runtime, "blanked", None, lambda: runtime.upload(octants, name))
         asked = options.ambient_occlusion
-        occlusion = None if asked is None else OcclusionGrid.of(self.grid, asked)
+        occlusion = None if asked is None else OcclusionGrid(self.grid, asked)
         strength = 0.0 if asked is None else asked.strength
         self._arguments: dict[str, Any] = {
             "classified": _numbers(volume, table, part, occlusion, strength),
