@@ -109,8 +109,8 @@ def raycast_medium(
             regions=regions,
             image=image,
         )
+        view = medium.rays.view(size, planes)
         if bricks is None:
-            view = medium.rays.view(size, planes)
             draw(samples=None, states=None)(block_items(width, height), view=view)
             return runtime.download(image)
         # Some steps of some rows at a time; the state of the rays goes on from step to step
@@ -123,9 +123,8 @@ def raycast_medium(
         for first_row in range(0, height, rows):
             now = min(rows, height - first_row)
             for first_step in range(0, medium.most_steps, _PART_STEPS):
-                part = {"first_row": first_row, "rows": now}
-                part |= {"first_step": first_step, "steps": _PART_STEPS}
-                view = medium.rays.view(size, planes, None, **part)
+                view |= {"first_row": first_row, "rows": now}
+                view |= {"first_step": first_step, "steps": _PART_STEPS}
                 sampler.sample(view)
                 launch(block_items(width, now), view=view)
         return runtime.download(image)
