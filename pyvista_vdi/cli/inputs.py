@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
-from pyvista_vdi.io import check_writable, check_write_options, stores, volumes
+from pyvista_vdi.io import check_writable, check_write_options, volumes
 from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.volumes.in_file import placed
@@ -106,9 +106,8 @@ def _laid_out(volume: Any, options: argparse.Namespace) -> Volume:
 
 def open_store(options: argparse.Namespace) -> Any:
     """Open the store that is named, with what is asked of it."""
-    asked = {"level": options.level, "channel": options.channel, "time": options.time_index}
-    chosen: Any = {name: value for name, value in asked.items() if value is not None}
-    return stores.StoredVolume(stores.store_at(options.file), **chosen)
+    chosen = {"level": options.level, "channel": options.channel, "time": options.time_index}
+    return volumes.read_volume(options.file, **chosen)
 
 
 def is_volume(options: argparse.Namespace) -> bool:
