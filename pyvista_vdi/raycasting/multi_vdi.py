@@ -212,8 +212,8 @@ def owned_image(
         own = request.replace(camera=one.camera, options=options)
         scenes.append(Scene.of(prepared_vdi(runtime, one.vdi), own, segments=True))
     order = canonical_order(placed, [scene.reference_depth for scene in scenes])
-    width, height = request.size
-    cells = _Cells.of(scenes, request.size)
+    width, height = request.window_size
+    cells = _Cells.of(scenes, request.window_size)
     with contextlib.ExitStack() as stack:
         on_device = [stack.enter_context(scene.on_device()) for scene in scenes]
         image = stack.enter_context(runtime.result((height, width, 4), name="image"))

@@ -26,7 +26,7 @@ def render_vdi(vdi: VDI, request: FrameRequest) -> NDArray[np.float32]:
     """
     runtime = get_runtime(request.device)
     prepared = prepared_vdi(runtime, vdi)
-    shape, out = (*request.size[::-1], 4), request.out
+    shape, out = (*request.window_size[::-1], 4), request.out
     with runtime.result(shape, name="image", out=out) as image:
         draw(prepared, request, image)
         return runtime.download(image, out)
@@ -39,7 +39,7 @@ def render_first_hits(vdi: VDI, request: FrameRequest, hit: FirstHit) -> NDArray
     """
     runtime = get_runtime(request.device)
     prepared = prepared_vdi(runtime, vdi)
-    with runtime.buffer(request.size[::-1], name="depth of first hits") as image:
+    with runtime.buffer(request.window_size[::-1], name="depth of first hits") as image:
         draw(prepared, request, image, hit)
         t = runtime.download(image)
     return (t + reference_depth(request.camera, vdi.bounds)).astype(np.float32)

@@ -39,8 +39,8 @@ class ClippedRays:
 
     def __init__(self, medium: DeviceVolume, request: FrameRequest) -> None:
         options = request.options
-        march = medium.rays.forms(request.camera, request.size, options.clipping_planes)
-        self.ends = rays.checked_opaque_depth(request.opaque_depth, request.size, march.rays)
+        march = medium.rays.forms(request.camera, request.window_size, options.clipping_planes)
+        self.ends = rays.checked_opaque_depth(request.opaque_depth, request.window_size, march.rays)
         cut, beyond, self.regions = rays.cropped(march.rays, options.cropping, medium.volume.bounds)
         self.planes, self.forms = march.planes + len(cut), march.packed(*cut, *beyond)
         self.variant = replace(medium.variant, double_float=march.double_float)
@@ -58,15 +58,15 @@ def raycast_volume(
     volume: Volume,
     transfer_function: TransferFunction,
     request: FrameRequest,
-    sampling: MediumOptions | None = None,
+    sampling: MediumOptions,
 ) -> NDArray[np.float32]:
     """Render a classified volume directly: premultiplied RGBA, float32 (H, W, 4), top row first.
 
     Samples at the midpoints of equal steps, composited front to back by the same kernel code that
     generates VDIs.
     """
-    sampling = sampling or MediumOptions()
-    room = picture_room(request.size, sampling.memory_limit, sampling.occlusion_bytes(volume))
+    occlusion = sampling.occlusion_bytes(volume)
+    room = picture_room(request.window_size, sampling.memory_limit, occlusion)
     medium = DeviceVolume(
         get_runtime(request.device),
         volume,
@@ -107,7 +107,7 @@ def raycast_medium(
     A cutoff of 0 ends no ray.
     """
     runtime, camera, options = medium.runtime, request.camera, request.options
-    width, height = size = request.size
+    width, height = size = request.window_size
     clipped = ClippedRays(medium, request)
     bricks = medium.bricks
     with ExitStack() as stack:

@@ -14,7 +14,6 @@ from pyvista_vdi.model.options import (
     DrawingOptions,
     Option,
     RenderOptions,
-    declared,
 )
 from pyvista_vdi.model.types import Draw, Policy
 
@@ -39,7 +38,7 @@ class MapperSettings:
         return self.adjust and self.target_fps != 0
 
 
-_DECLARED = declared(RenderOptions, DrawingOptions)
+_DECLARED = RenderOptions.declared | DrawingOptions.declared
 
 #: The settings, by VTK's names.
 SETTINGS: Mapping[str, Option] = {
