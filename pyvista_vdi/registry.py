@@ -63,7 +63,6 @@ class Extension:
 
     names: Places = field(default_factory=dict)  # public names of pyvista_vdi
     formats: tuple[FileFormat, ...] = ()
-    shown: Places = field(default_factory=dict)  # what makes a mapper's Input, by classes of data
     verbs: tuple[Verb, ...] = ()
     methods: Places = field(default_factory=dict)  # that lower rooms call, by names for them
     requires: tuple[str, ...] = ()  # extensions without which it is left out
@@ -116,12 +115,6 @@ def method(name: str, otherwise: Any = None) -> Any:
             f"{', '.join(sorted(extensions())) or 'none'}): install pyvista-vdi whole"
         )
     return found
-
-
-def shown(data: Any) -> Any:
-    """Return the function that makes of data what a mapper draws, by their class, or None."""
-    kinds = (f"{kind.__module__}:{kind.__qualname__}" for kind in type(data).__mro__[:-1])
-    return next((make for kind in kinds if (make := placed("shown", kind)) is not None), None)
 
 
 def placed(what: str, name: str) -> Any:

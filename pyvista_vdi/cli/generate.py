@@ -46,7 +46,6 @@ def generate(options: argparse.Namespace) -> int:
     with closing(DelayedBar()) as bar:
         vdi = generate_vdi(volume, view, options.size, progress=bar, **how)
     seconds = time.perf_counter() - start
-    file_arguments.pop("precision", None)  # which it has
     with closing(DelayedBar(label="writing it")) as bar:
         vdi.save(path, progress=bar, **file_arguments)
     say_vdi(options, vdi, f", {seconds:.1f} s")

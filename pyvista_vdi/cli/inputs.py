@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
-from pyvista_vdi.io import check_writable, check_write_options, stores, volumes
+from pyvista_vdi.io import check_writable, check_write_options, volumes
 from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.volumes.in_file import placed
@@ -19,7 +19,6 @@ from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification, Look
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 
@@ -30,7 +29,7 @@ OF_VOLUMES = (
     *("scalars", "preference", "spacing", "origin", "level", "channel", "time_index", "series"),
 )
 #: Options that give colours and opacities.
-LOOK = ("transfer_function", *declared(Look))
+LOOK = ("transfer_function", *Look.declared)
 #: Options that say where the eye is, instead of turning the default view.
 PLACE = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")
 
@@ -40,8 +39,8 @@ def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dic
 
     What is seldom turned is in ``settings``, or ``flat`` beside the others.
     """
-    values = {name: getattr(options, name, None) for name in declared(*records)}
-    found = {name: value for name, value in values.items() if value is not None}
+    named = {name for record in records for name in record.declared}
+    found = {n: value for n, value in vars(options).items() if n in named and value is not None}
     seldom = {name: found.pop(name) for name in Settings.declared if name in found and not flat}
     return found | ({"settings": Settings(**seldom)} if seldom else {})
 
@@ -106,9 +105,8 @@ def _laid_out(volume: Any, options: argparse.Namespace) -> Volume:
 
 def open_store(options: argparse.Namespace) -> Any:
     """Open the store that is named, with what is asked of it."""
-    asked = {"level": options.level, "channel": options.channel, "time": options.time_index}
-    chosen: Any = {name: value for name, value in asked.items() if value is not None}
-    return stores.StoredVolume(stores.store_at(options.file), **chosen)
+    chosen = {"level": options.level, "channel": options.channel, "time": options.time_index}
+    return volumes.read_volume(options.file, **chosen)
 
 
 def is_volume(options: argparse.Namespace) -> bool:

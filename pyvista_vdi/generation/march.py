@@ -20,6 +20,10 @@ from pyvista_vdi.volume.rays import GridRays, RayLaunch
 
 #: Steps of a ray between two looks at the length of its record.
 CHUNK_STEPS = 128
+#: The same before the first look: few, so that rays which cannot keep every detail learn it soon.
+_FIRST_CHUNK_STEPS = 64
+#: Tiles across a window, and at least as many up it, in each of which the longest ray is found.
+_TILES = 16
 #: Bytes of one recorded run on the device, and of its merge error.
 _RUN_BYTES = (RUN_WORDS + 1) * 4
 #: Bytes of runs that one slice of rays records at a time; also how often progress is reported. On a
@@ -186,15 +190,6 @@ class Records:
         """Write the slice's lists behind those made before; what is launched next need not wait."""
         places = lists.follow(self.counts, self.lists)
         self._pack(self.items, GROUP, view=self.view, **places)
-
-
-#: Steps of a ray before the first look at the length of its record: few, so that rays which cannot
-#: keep every detail learn it soon.
-_FIRST_CHUNK_STEPS = 64
-
-
-#: Tiles across a window, and at least as many up it, in each of which the longest ray is found.
-_TILES = 16
 
 
 class Chunk(NamedTuple):

@@ -1,7 +1,6 @@
 """Several VDIs of one scene, shown as one: what extensions derive series and sets from."""
 
 import os
-from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,7 +11,6 @@ from pyvista_vdi.model.vdi import VDI, Lists
 
 #: Steps per second at which those of several times are played.
 RATE = 24.0
-
 
 _Collection = TypeVar("_Collection", bound="VDICollection")
 
@@ -27,12 +25,12 @@ class VDICollection(Sequence[VDI]):
     times: tuple[float, ...] | None = None
     #: The view to begin with.
     camera: Camera
+    #: Place of the class of what a mapper draws of it.
+    drawn_by: str
+    #: Returns the index of the VDI that is nearest to a time, or to a view.
+    nearest: Callable[[Any], int]
     #: Returns it with what a function makes of each VDI, when that is asked for.
     _mapped: Callable[[Callable[[VDI], VDI]], Any]
-
-    @abstractmethod
-    def nearest(self, at: Any) -> int:
-        """Return the index of the VDI that is nearest to a time, or to a view."""
 
     def _place(self, index: int, what: str) -> int:
         """Return an index counted from the first; IndexError if there is no such VDI."""

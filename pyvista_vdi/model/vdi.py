@@ -24,9 +24,6 @@ from pyvista_vdi.model.transfer_function import TransferFunction
 #: What of a camera differs between a view on the screen and one that covers all of a volume.
 LENS = ("view_angle", "use_horizontal_view_angle", "parallel_scale", "window_center")
 
-#: Straight colours and optical depths of supersegments.
-Media = tuple[NDArray[np.float32], NDArray[np.float32]]
-
 #: Cells of the tables that a transfer function is integrated in, over the range of values: a window
 #: of a fiftieth of it has 327.
 CELLS = 1 << 14
@@ -297,7 +294,7 @@ class DeferredVDI(Lists):
                 f"its values are of version {version!r}, and this program reads version 1: "
                 "upgrade by pip install -U pyvista-vdi"
             )
-        if lists.n_supersegments and not float(lists.optical_depth.max()) <= 0.5:
+        if (lists.optical_depth > 0.5).any():
             k = int(np.argmax(lists.optical_depth))
             raise InvalidVDIError(
                 f"supersegment {k} breaks the rule '0 <= spread <= 0.5': {lists.optical_depth[k]}"

@@ -12,7 +12,7 @@ from pyvista_vdi.device.constants import GROUP
 from pyvista_vdi.model.packing import Arrays
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import DeviceLike
-from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, Media, classification_of, made_vdi
+from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, classification_of, made_vdi
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class ValuesLook:
     deferred: DeferredVDI
     integrals: NDArray[np.float32]
 
-    def media_of(self, rows: Any) -> Media:
+    def media_of(self, rows: Any) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return straight colours, float32 (n, 3), and optical depths, float32 (n,)."""
         runtime, kept = self.runtime, self.deferred
         arrays = {"means": kept.mean, "spreads": kept.spread, "steps": kept.steps}

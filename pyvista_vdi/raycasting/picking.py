@@ -114,13 +114,13 @@ def pick_vdi(
     was classified from.
     """
     camera, options = request.camera, request.options
-    (x, y), (width, height) = as_range(pixel), request.size
+    (x, y), (width, height) = as_range(pixel), request.window_size
     if not (-0.5 <= x < width - 0.5 and -0.5 <= y < height - 0.5):
         raise InvalidArgumentError(
             f"pixel must be (x, y) inside the window of {width} x {height}, y = 0 at the bottom; "
             f"got {pixel!r}"
         )
-    ray = _Ray.of_pixel(vdi, camera, (x, y), request.size)
+    ray = _Ray.of_pixel(vdi, camera, (x, y), request.window_size)
     span = ray.span(vdi, request)
     if span is None:
         return None

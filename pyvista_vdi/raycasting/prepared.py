@@ -16,7 +16,7 @@ from pyvista_vdi.device.constants import BUNDLE, GROUP, LIST_HEADER, LISTS_PER_I
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import lists_are_far
-from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, Media, made_vdi
+from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, made_vdi
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.classified_values import ValuesLook
 from pyvista_vdi.volume.upload import release_voxels
@@ -190,27 +190,22 @@ def _share_in_bounds(
     return float(np.maximum(last - first, 0).mean() / depth) if depth > 0 else 0.0
 
 
-def _share_lit(
-    vdi: VDI,
-    near: float,
-    far: float,
-    media_of: Callable[[NDArray[np.int64]], Media] | None = None,
-) -> float:
+def _share_lit(vdi: VDI, near: float, far: float, look: ValuesLook | None = None) -> float:
     """Return how much of the depths from ``near`` to ``far`` light gets through, the lists' mean.
 
     Of some of the lists that are not empty; 1 in a list through which it gets. View depths of V_O.
-    ``media_of``: those of some supersegments, where others are shown than the VDI's.
+    ``look``: has the media that are shown, where they are others than the VDI's.
     """
     offsets = vdi.offsets.view(np.int64)
     lists = np.flatnonzero(np.diff(offsets))
-    sampled = _SAMPLED_LISTS if media_of is None else _SAMPLED_LISTS_OF_VALUES
+    sampled = _SAMPLED_LISTS if look is None else _SAMPLED_LISTS_OF_VALUES
     lists = lists[:: -(-len(lists) // sampled) or 1]
     if not len(lists):
         return 1.0
     counts = offsets[lists + 1] - offsets[lists]
     begins = np.cumsum(counts) - counts
     places = np.arange(counts.sum()) + np.repeat(offsets[lists] - begins, counts)
-    optical_depth = vdi.optical_depth[places] if media_of is None else media_of(places)[1]
+    optical_depth = vdi.optical_depth[places] if look is None else look.media_of(places)[1]
     optical_depth = optical_depth.astype(np.float64)
     before = np.cumsum(optical_depth) - optical_depth
     before -= np.repeat(before[begins], counts)
@@ -220,7 +215,7 @@ def _share_lit(
     depth = front + np.minimum(left, 1.0) * (back - front) + vdi.depth_origin
     through = np.add.reduceat(optical_depth, begins) < _DARK
     shares = np.where(through, 1.0, (depth - near) / max(far - near, np.finfo(np.float64).tiny))
-    if media_of is not None:  # lists of which nothing is shown are empty
+    if look is not None:  # lists of which nothing is shown are empty
         shares = shares[np.add.reduceat(optical_depth, begins) > 0]
     return float(np.clip(shares, 0.0, 1.0).mean()) if len(shares) else 1.0
 
@@ -457,7 +452,7 @@ class KeptValues(PreparedVDI):
         """Return what a transfer function shows: what is transparent is left out."""
         runtime, shown = self.runtime, copy.copy(self)
         if runtime.is_cpu:
-            shown.lit = _share_lit(self._lists, *self.depths, look.media_of)
+            shown.lit = _share_lit(self._lists, *self.depths, look)
         with (
             kept_together() as keep,
             runtime.upload(look.integrals, "integrals of a transfer function") as table,

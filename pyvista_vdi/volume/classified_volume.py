@@ -182,10 +182,7 @@ class DeviceVolume:
         medium = {**{name: self._arguments[name] for name in names}, "visible": self._visible}
         variant = replace(self.variant, shaded=0, compensated=0, sharp=False)
         lengths = self.sample_distance, self.unit_distance
-
-        def make() -> DeviceBuffer:
-            return ambient_transmittances(self.runtime, grid, medium, variant, lengths)
-
+        make = partial(ambient_transmittances, self.runtime, grid, medium, variant, lengths)
         return uploads_of(self.volume).kept(self.runtime, "occlusion", key, make)
 
 

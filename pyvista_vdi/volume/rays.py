@@ -80,7 +80,7 @@ class GridRays:
         return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), two_floats)
 
     def view(
-        self, size: Sequence[int], planes: int, window: Rectangle | None = None, **changes: int
+        self, size: Sequence[int], planes: int, window: Rectangle | None = None
     ) -> dict[str, Any]:
         """Return the numbers of rays (``RaysOfView``) through part of a window, or all of it."""
         width, height = size
@@ -93,7 +93,6 @@ class GridRays:
             "first_step": 0,
             "steps": ALL_STEPS,
             **part,
-            **changes,
             "sample_distance": self.sample_distance,
             "unit_distance": self.unit_distance,
         }

@@ -32,15 +32,15 @@ def raycast_volume(
     volume: Volume,
     transfer_function: TransferFunction,
     request: FrameRequest,
-    sampling: MediumOptions | None = None,
+    sampling: MediumOptions,
 ) -> NDArray[np.float32]:
     """Render a classified volume directly: premultiplied RGBA, float32 (H, W, 4), top row first.
 
     Samples at the midpoints of equal steps, composited front to back by the same kernel code that
     generates VDIs.
     """
-    sampling = sampling or MediumOptions()
-    room = picture_room(request.size, sampling.memory_limit, sampling.occlusion_bytes(volume))
+    occlusion = sampling.occlusion_bytes(volume)
+    room = picture_room(request.window_size, sampling.memory_limit, occlusion)
     medium = DeviceVolume(
         get_runtime(request.device),
         volume,
@@ -81,7 +81,7 @@ def raycast_medium(
     A cutoff of 0 ends no ray.
     """
     runtime, camera, options = medium.runtime, request.camera, request.options
-    width, height = size = request.size
+    width, height = size = request.window_size
     bricks, upload = medium.bricks, partial(runtime.upload, brief=True)
     march = medium.rays.forms(camera, size, options.clipping_planes)
     variant = replace(medium.variant, double_float=march.double_float)
@@ -109,8 +109,8 @@ def raycast_medium(
             regions=regions,
             image=image,
         )
+        view = medium.rays.view(size, planes)
         if bricks is None:
-            view = medium.rays.view(size, planes)
             draw(samples=None, states=None)(block_items(width, height), view=view)
             return runtime.download(image)
         # Some steps of some rows at a time; the state of the rays goes on from step to step
@@ -123,9 +123,8 @@ def raycast_medium(
         for first_row in range(0, height, rows):
             now = min(rows, height - first_row)
             for first_step in range(0, medium.most_steps, _PART_STEPS):
-                part = {"first_row": first_row, "rows": now}
-                part |= {"first_step": first_step, "steps": _PART_STEPS}
-                view = medium.rays.view(size, planes, None, **part)
+                view |= {"first_row": first_row, "rows": now}
+                view |= {"first_step": first_step, "steps": _PART_STEPS}
                 sampler.sample(view)
                 launch(block_items(width, now), view=view)
         return runtime.download(image)

@@ -72,7 +72,7 @@ def held_voxels(
     runtime: Runtime, volume: Volume, transfer_function: TransferFunction, room: Room | None
 ) -> HeldVoxels:
     """Upload a volume for a transfer function, or what is known of it where it does not fit."""
-    dtype = volume.array.dtype
+    dtype, uploads = volume.array.dtype, uploads_of(volume)
     native = dtype.name in _DEVICE_TYPES
     if native and not volume.rgba:  # a byte is exact, and colours have no such range
         low, high = transfer_function.scalar_range
@@ -82,26 +82,23 @@ def held_voxels(
         index="ulong" if volume.array.size >= 2**32 else "uint",
         components=4 if volume.rgba else 1,
     )
-    if native and dtype.kind == "f":
-        native = not _too_large(runtime, volume, variant, room)
-    scale = None if native else scale_of(volume, *transfer_function.scalar_range)
+    scale = None
+    if not native or uploads.too_large:
+        scale = scale_of(volume, *transfer_function.scalar_range)
     if room is None or fits_whole(runtime, volume, scale, room):
-        return HeldVoxels(*upload_voxels(runtime, volume, scale, variant), scale, variant)
-    ranges = upload_ranges(runtime, volume, scale, variant, room)
-    return HeldVoxels(None, ranges, scale, variant)
-
-
-def _too_large(runtime: Runtime, volume: Volume, variant: Variant, room: Room | None) -> bool:
-    """Whether differences of a float32 volume's finite voxels may overflow; found once."""
-    uploads = uploads_of(volume)
-    if uploads.too_large is None:
-        if room is None or fits_whole(runtime, volume, None, room):
-            ends = runtime.download(upload_voxels(runtime, volume, None, variant)[1])
-        else:
-            ends = _ranges_in_parts(runtime, volume, None, variant, room)
+        held = HeldVoxels(*upload_voxels(runtime, volume, scale, variant), scale, variant)
+    else:
+        ranges = upload_ranges(runtime, volume, scale, variant, room)
+        held = HeldVoxels(None, ranges, scale, variant)
+    # Look once whether differences of finite float32 voxels may overflow: such are scaled as well
+    if scale is None and dtype.kind == "f" and uploads.too_large is None:
+        ends = runtime.download(held.ranges)
         largest = np.abs(ends).max(initial=0.0, where=np.isfinite(ends))
         uploads.too_large = bool(largest > LARGEST_VOXEL)
-    return uploads.too_large
+        if uploads.too_large:
+            del held  # its memory goes first
+            return held_voxels(runtime, volume, transfer_function, room)
+    return held
 
 
 def uploads_of(volume: Volume) -> _Uploads:
@@ -126,7 +123,7 @@ class _Uploads:
         self.made: dict[tuple[Runtime, str], tuple[Any, Any]] = {}
         #: Scalar range of each macrocell of a volume that no device holds in one piece, by scaling.
         self.ranges: dict[Any, NDArray[np.float32]] = {}
-        #: Whether float32 cannot hold the voxels' differences; None before anyone has asked.
+        #: Whether float32 cannot hold float32 voxels' differences; None before anyone has looked.
         self.too_large: bool | None = None
 
     def kept(self, runtime: Runtime, what: str, key: Any, make: Callable[[], T]) -> T:

@@ -9,11 +9,7 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.api import generate
-from pyvista_vdi.errors import (
-    InvalidArgumentError,
-    InvalidArgumentTypeError,
-    naming,
-)
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, naming
 from pyvista_vdi.extensions.series.archive import Called
 from pyvista_vdi.extensions.series.series import VDISeries, checked_times
 from pyvista_vdi.io.progress import Pieces

@@ -71,7 +71,7 @@ class VDISeries(Several):
     """
 
     times: tuple[float, ...]
-    kind = SERIES
+    kind, drawn_by = SERIES, "pyvista_vdi.extensions.series.shown:SeriesInput"
 
     def __init__(self, steps: Iterable[VDI], times: Iterable[float] | None = None) -> None:
         self._vdis = as_steps(steps, "a series")

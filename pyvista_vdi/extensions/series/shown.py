@@ -54,6 +54,7 @@ class SeveralInput(Input):
     def __init__(self, vdis: Any, thread: str) -> None:
         super().__init__()
         self.collection = vdis
+        self.device: Any = None
         self.memory: float = MEMORY
         self._lock = threading.Lock()
         self._ready: dict[int, VDI] = {}  # by index
@@ -86,6 +87,11 @@ class SeveralInput(Input):
         with self._lock:
             ready = [*self._ready.values()]
         return [self.last, *ready, *(one.last for one in self._kept.values())]
+
+    def look(self, camera: Camera, device: Any) -> None:
+        """Read, for a device, what a view needs, or what comes next."""
+        self.device = device
+        self._read_ahead()
 
     def rest(self) -> None:
         """Leave no thread; the next frame may begin anew."""
@@ -124,10 +130,10 @@ class SeveralInput(Input):
             self._trim()
         return vdi
 
-    def _read_ahead(self, device: Any) -> None:
+    def _read_ahead(self) -> None:
         """Have read what is wanted, VDI after VDI, until enough are ready."""
         if not self._worker.running and self._wanted() is not None:
-            self._worker.put(Decoding(lambda on, _report: self._decode(on), device))
+            self._worker.put(Decoding(lambda on, _report: self._decode(on), self.device))
 
     def _decode(self, runtime: Runtime) -> bool:
         for _ in range(self.ahead):  # then a frame must have come: nobody may be looking
@@ -164,7 +170,6 @@ class SeriesInput(SeveralInput):
 
     def __init__(self, series: VDISeries, clock: Callable[[], float] = time.perf_counter) -> None:
         super().__init__(series, "pyvista-vdi series")
-        self.device: Any = None
         #: Steps per second, and whether one is shown after the other.
         self.rate, self.playing = RATE, False
         self._clock, self._loop = clock, True
@@ -200,10 +205,6 @@ class SeriesInput(SeveralInput):
     @time.setter
     def time(self, time: float) -> None:
         self.step = self.collection.nearest(time)
-
-    def look(self, camera: Camera, device: Any) -> None:
-        """Read for a device."""
-        self.device = device
 
     def play(
         self, rate: float = RATE, *, loop: bool = True, memory_limit: int | None = None
@@ -247,7 +248,7 @@ class SeriesInput(SeveralInput):
         if not self._loop and due >= n - 1 and not left:
             self.pause()
         else:
-            self._read_ahead(self.device)
+            self._read_ahead()
         if error is not None:
             raise error
         return self._place != before

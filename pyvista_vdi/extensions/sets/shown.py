@@ -37,7 +37,7 @@ class SetInput(SeveralInput):
         with self._lock:
             self._weights = self.collection.weights(camera)
             self._order = [int(i) for i in distances.argsort(kind="stable")]
-        self._read_ahead(device)
+        super().look(camera, device)
 
     def parts(self) -> list[tuple[VDI, float]]:
         """Return what a picture is blended of, with weights; the nearest first."""

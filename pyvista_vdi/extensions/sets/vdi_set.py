@@ -82,7 +82,7 @@ class VDISet(Several):
         the nearest. 0 shows the nearest alone.
     """
 
-    kind = EXTENSION.formats[0]
+    kind, drawn_by = EXTENSION.formats[0], "pyvista_vdi.extensions.sets.shown:SetInput"
 
     def __init__(
         self,

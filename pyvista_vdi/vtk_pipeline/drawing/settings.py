@@ -14,7 +14,6 @@ from pyvista_vdi.model.options import (
     DrawingOptions,
     Option,
     RenderOptions,
-    declared,
 )
 from pyvista_vdi.model.types import Draw, Policy
 
@@ -34,7 +33,7 @@ class MapperSettings:
     off_screen: bool = False
 
 
-_DECLARED = declared(RenderOptions, DrawingOptions)
+_DECLARED = RenderOptions.declared | DrawingOptions.declared
 
 #: The settings, by VTK's names.
 SETTINGS: Mapping[str, Option] = {
