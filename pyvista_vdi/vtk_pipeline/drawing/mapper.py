@@ -27,8 +27,8 @@ class VDIMapperMethods:
     #: What draws; made with the mapper, before which PyVista's constructor sets some settings.
     driver: Any = None
 
-    def _become_vdi_mapper(self: Any) -> None:
-        """Install proxy and observers; to be called once, from ``__init__``."""
+    def __init__(self: Any, **given: Any) -> None:
+        super().__init__(**given)  # type: ignore[misc]
         self.driver: Driver = Driver()
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
@@ -132,6 +132,3 @@ class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
     A problem while drawing is reported once as a ``VDIWarning`` and the last good image stays:
     exceptions cannot pass through VTK's renderer. Where nothing is left to draw, nothing is shown.
     """
-
-    def __init__(self) -> None:
-        self._become_vdi_mapper()

@@ -192,8 +192,7 @@ class Window:
     @property
     def whole_picture(self) -> bool:
         """Whether this frame is a whole picture by itself, and not a tile of one."""
-        window = self.vtk_window()
-        return window is None or tuple(window.GetTileScale()) == (1, 1)
+        return tuple(self.vtk_window().GetTileScale()) == (1, 1)
 
     @property
     def keeps_picture(self) -> bool:
