@@ -366,7 +366,7 @@ class Driver:
         window, settings, view = frame.window, self.settings, frame.view
         # What is drawn in several views is out of date in none of them by itself
         one_view = len(renderers) == 1 and len(source.drivers) == 1
-        several = len(window.shown_in(frame.renderer)) > 1
+        joint = len(window.shown_in(frame.renderer)) > 1 and len(group_of(frame).members) > 1
         # Work may go on behind the frames where somebody watches, and can move
         vtk_window = window.vtk_window()
         here = bool(vtk_window.GetShowWindow()) and vtk_window.GetInteractor() is not None
@@ -419,7 +419,7 @@ class Driver:
             hand=moving and not settled,
             settled=settled and not moving,
             one_view=one_view,
-            joint=several and len(group_of(frame).members) > 1,
+            joint=joint,
             first_look=first,
             made=None if vdi is None else self._as_made(vdi, frame, made_of),
             volume=volume,  # type: ignore[arg-type]

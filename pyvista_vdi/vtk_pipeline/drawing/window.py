@@ -142,21 +142,9 @@ class Window:
         if key not in self.of_frame or self.started is None:
             if known is None or known() is not renderer:
                 self._renderers[address] = weakly(renderer)
-                weak = weakref.ref(self)
-
-                def camera_changed(*_: Any) -> None:
-                    window = weak()
-                    if window is not None:
-                        window._camera_changed()
-
-                active = self.active  # no cycle through the observers
-
-                def drawing(renderer: Any, event: str) -> None:
-                    active.Set(renderer if event == "StartEvent" else None)
-
-                renderer.AddObserver("ActiveCameraEvent", camera_changed)
-                renderer.AddObserver("StartEvent", drawing)
-                renderer.AddObserver("EndEvent", drawing)
+                renderer.AddObserver("StartEvent", self._drawing)
+                renderer.AddObserver("EndEvent", self._drawing)
+                renderer.AddObserver("ActiveCameraEvent", self._camera_changed)
             self.of_frame[key] = list(_volumes_of(renderer.GetViewProps()))
         return self.of_frame[key]  # type: ignore[no-any-return]
 
@@ -270,7 +258,10 @@ class Window:
         self.pace.ended(seconds, self.moving)
         self.of_frame.clear()
 
-    def _camera_changed(self) -> None:
+    def _drawing(self, renderer: Any, event: str) -> None:
+        self.active.Set(renderer if event == "StartEvent" else None)
+
+    def _camera_changed(self, *_: Any) -> None:
         """Replace a preview on the screen by the full frame before a screenshot reads it.
 
         ``vtkWindowToImageFilter`` puts a copy of its own in place of each renderer's camera, and
