@@ -93,14 +93,6 @@ class VDIMapperMethods:
         source = self.driver.input
         return source if isinstance(source, VDISource) else None
 
-    def SetDevice(self, device: Any) -> None:
-        """Choose the OpenCL device; ``None`` is the default one."""
-        self.driver.device = device
-
-    def GetDevice(self) -> Any:
-        """Return the device as it was set."""
-        return self.driver.device
-
     # VTK's own switch would draw its volume into a smaller framebuffer
 
     def AutoAdjustSampleDistancesOn(self: Any) -> None:

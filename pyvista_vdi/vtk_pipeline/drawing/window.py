@@ -214,7 +214,7 @@ class Window:
             for driver in drivers:
                 driver.advance()
         self._foreground.close()
-        for runtime in {get_runtime(driver.device) for driver in drivers}:
+        for runtime in {get_runtime(driver.settings.device) for driver in drivers}:
             self._foreground.enter_context(runtime.foreground())
         samples = window.GetMultiSamples()
         if samples and self.pace.slow_samples:
