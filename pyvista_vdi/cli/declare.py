@@ -22,7 +22,6 @@ from pyvista_vdi.model.options import (
     GenerationOptions,
     QualityTarget,
     RenderOptions,
-    declared,
 )
 
 
@@ -96,7 +95,7 @@ _CALLED = {
     "ArrayLike": "A,B,...",
     "OpacityLike": "NAME|A,B,...",
 }
-_RECORDS = (RenderOptions, DrawingOptions, Classification, Deferral)
+_RECORDS = (RenderOptions, DrawingOptions, Classification, Deferral, GenerationOptions)
 
 _OPTIONS = """
 output              FILE      .vdi, .exr or .html to write
@@ -232,7 +231,7 @@ def _add_option(into: Any, name: str, value: str, text: str) -> None:
 def _known() -> dict[str, tuple[str, str, str]]:
     """Return the options that are known by their names: name and default, value, and text."""
     found = {}
-    for name, told in declared(*_RECORDS, GenerationOptions, QualityTarget).items():
+    for told in [told for each in (*_RECORDS, QualityTarget) for told in each.declared.values()]:
         value = _CALLED.get(told.kind.removesuffix(" | None"), "NAME")
         value = "DEGREES" if "degrees" in told.what else value
         value = "{" + ",".join(told.choices) + "}" if told.choices else value
@@ -240,7 +239,7 @@ def _known() -> dict[str, tuple[str, str, str]]:
         plain = isinstance(usual, int | float) and not isinstance(usual, bool)
         text += f" (default: {usual:g})" if plain else ""
         text += f" (default: {usual})" if told.choices and usual else ""
-        found[name] = name, value, text
+        found[told.name] = told.name, value, text
     for line in _OPTIONS.strip().splitlines():
         name, value, text = re.split(" {2,}", line, maxsplit=2)
         found[name.partition("=")[0]] = name, value, text

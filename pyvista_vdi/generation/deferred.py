@@ -13,7 +13,6 @@ from pyvista_vdi.model.options import (
     Deferral,
     GenerationOptions,
     GenerationRequest,
-    record,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import DeferredVDI, lengths_of, made_vdi
@@ -42,7 +41,6 @@ def unclassified(interpolation: str) -> TransferFunction:
     return TransferFunction([[0] * 3], [0], (0, 1), interpolation=interpolation)
 
 
-@record
 @dataclass(frozen=True)
 class _LengthOptions(GenerationOptions):
     """Options under which merging counts lengths alone, of a medium of :data:`_PER_VOXEL`."""

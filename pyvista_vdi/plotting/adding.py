@@ -34,7 +34,6 @@ from pyvista_vdi.model.options import (
     Options,
     QualityTarget,
     option,
-    record,
 )
 from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI, DeferredVDI, picture_view
@@ -70,54 +69,51 @@ def _note_mapper(name: Any) -> None:
         warn_external(f"mapper={name!r} chooses among VTK's volume mappers and is ignored")
 
 
-@record
 @dataclass(frozen=True, eq=False)
 class Placement(Options):
-    """Where an actor is put in a plotter, and what is shown beside it."""
+    """Where an actor is put in a plotter, and what is shown beside it.
 
-    reset_camera: bool | None = option(None, "whether the view is reset, as in ``add_volume``")
-    name: str | None = option(None, "of the actor; another of this name is replaced")
-    culling: bool | str = option(False, "of faces, which a volume has none of")
-    multi_colors: bool = option(
-        False, "give each block of a ``MultiBlock`` a colour map of its own"
-    )
-    mapper: str | None = option(
-        None,
-        "of VTK's volume mappers; a VDI has its own, and none means a thing",
-        check=_note_mapper,
-    )
-    scalar_bar_args: Mapping[str, Any] | None = option(
-        None,
-        "of the scalar bar, as in ``add_volume``",
-        takes="dict[str, Any] | None",
-    )
-    show_scalar_bar: bool | None = option(None, "whether there is a scalar bar; as the theme says")
-    pickable: Any = option(True, "whether it can be picked", takes="bool")
-    render: bool | None = option(True, "whether the plotter renders at once")
-    user_matrix: MatrixLike | None = option(None, "places the actor in the world")
+    reset_camera: whether the view is reset, as in ``add_volume``
+    name: of the actor; another of this name is replaced
+    culling: of faces, which a volume has none of
+    multi_colors: give each block of a ``MultiBlock`` a colour map of its own
+    mapper: of VTK's volume mappers; a VDI has its own, and none means a thing
+    scalar_bar_args: of the scalar bar, as in ``add_volume``
+    show_scalar_bar: whether there is a scalar bar; as the theme says
+    pickable: whether it can be picked
+    render: whether the plotter renders at once
+    user_matrix: places the actor in the world
+    """
+
+    reset_camera: bool | None = None
+    name: str | None = None
+    culling: bool | str = False
+    multi_colors: bool = False
+    mapper: str | None = option(None, _note_mapper)
+    scalar_bar_args: Mapping[str, Any] | None = option(None, kind="dict[str, Any] | None")
+    show_scalar_bar: bool | None = None
+    pickable: Any = option(True, kind="bool")
+    render: bool | None = True
+    user_matrix: MatrixLike | None = None
 
 
-@record
 @dataclass(frozen=True, eq=False)
 class InputOptions(Options):
-    """What a VDI is made of, from where, and by what."""
+    """What a VDI is made of, from where, and by what.
 
-    resolution: Sequence[float] | None = option(None, "spacing of a NumPy array; 1 by default")
-    camera: CameraLike | None = option(
-        None,
-        "the generating view",
-        "By default that of the first picture, and that of the frame where ``regenerate`` says so.",
-    )
-    device: DeviceLike | None = option(
-        None,
-        "the OpenCL device; by default ``PYVISTA_VDI_DEVICE``, else the best one found",
-    )
-    progress_bar: bool | Callable[[float], object] | None = option(
-        None,
-        "whether a bar shows how much is done; by default on a terminal, after a second of work",
-        "``True`` shows it elsewhere, too, ``False`` never; a callable gets the fraction done, and "
-        "stops the work if it returns ``False``. Ctrl-C stops it as well.",
-    )
+    resolution: spacing of a NumPy array; 1 by default
+    camera: the generating view
+        By default that of the first picture, and that of the frame where ``regenerate`` says so.
+    device: the OpenCL device; by default ``PYVISTA_VDI_DEVICE``, else the best one found
+    progress_bar: whether a bar shows how much is done; by default on a terminal, after a second
+        ``True`` shows it elsewhere, too, ``False`` never; a callable gets the fraction done, and
+        stops the work if it returns ``False``. Ctrl-C stops it as well.
+    """
+
+    resolution: Sequence[float] | None = None
+    camera: CameraLike | None = None
+    device: DeviceLike | None = None
+    progress_bar: bool | Callable[[float], object] | None = None
 
 
 @dataclass(frozen=True, eq=False)

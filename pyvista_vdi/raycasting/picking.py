@@ -114,13 +114,13 @@ def pick_vdi(
     was classified from.
     """
     camera, options = request.camera, request.options
-    (x, y), (width, height) = as_range(pixel), request.size
+    (x, y), (width, height) = as_range(pixel), request.window_size
     if not (-0.5 <= x < width - 0.5 and -0.5 <= y < height - 0.5):
         raise InvalidArgumentError(
             f"pixel must be (x, y) inside the window of {width} x {height}, y = 0 at the bottom; "
             f"got {pixel!r}"
         )
-    ray = _Ray.of_pixel(vdi, camera, (x, y), request.size)
+    ray = _Ray.of_pixel(vdi, camera, (x, y), request.window_size)
     span = ray.span(vdi, request)
     if span is None:
         return None
@@ -190,7 +190,7 @@ class _Ray:
         """Return first and last t where there may be a medium; ``None`` where there is none."""
         planes = request.options.clipping_planes
         of_view = rays.view_planes(request.camera, self.window, planes)
-        table = np.asarray(rays.box_planes(self.window, vdi.bounds) + of_view)
+        table = np.vstack([rays.box_planes(self.window, vdi.bounds), of_view])
         (u, v, depth, d), (du, dv, ddepth, dd) = self.at, self.slope
         value = [*(table[:, :3] @ self.pixel), d + u, d - u, d + v, d - v]
         slope = [*(table[:, 3:] @ self.pixel), dd + du, dd - du, dd + dv, dd - dv]

@@ -32,7 +32,7 @@ WRONG = [
     ("n_colors", 0, "n_colors must be a whole number from 1 to 16384; got 0"),
     ("cmap", "viridys", "cmap='viridys'.*did you mean 'viridis'"),
     ("opacity", [-1e308, 1e308], "stretched to that range, .* different values"),
-    ("opacity_unit_distance", "x", "opacity_unit_distance must be a positive .* got 'x'"),
+    ("opacity_unit_distance", "x", "opacity_unit_distance must be a length .* got 'x'"),
     ("interpolation", "cubic", "must be 'nearest' or 'linear'"),
     ("transfer_function", "bone", "must be a pyvista_vdi.TransferF"),
     ("max_supersegments", 4097, "1 to 4096; got 4097"),
@@ -58,7 +58,7 @@ WRONG = [
     ("memory_limit", "lots", "memory_limit.*got 'lots'"),
     ("regenerate_below", 1.5, "must be an SSIM .*got 1.5"),
     ("transmittance_cutoff", 1, "got 1"),
-    ("target_fps", -1, "number of frames per second, .*got -1"),
+    ("target_fps", -1, "frames per second, 0 or above; got -1"),
     ("regenerate", "always", "regenerate must be .*'auto'.*'never'.*'always'"),
     ("draw", "both", "draw must be .*'both'"),
 ]

@@ -62,7 +62,7 @@ class VolumePicture:
         medium = DeviceVolume(runtime, volume, look, sampling, room=room)
         self._medium: DeviceVolume | None = medium
         if medium.bricks is not None:
-            with medium.giving_bricks_back():  # to be taken by each picture, for its own size
+            with medium.bricks:  # to be taken by each picture, for its own size
                 self._medium = None
                 if not in_bricks:
                     raise DeviceMemoryError(f"the volume {volume.name!r} is held brick by brick")

@@ -14,7 +14,6 @@ from pyvista_vdi.model.options import (
     DrawingOptions,
     Option,
     RenderOptions,
-    declared,
 )
 from pyvista_vdi.model.types import Draw, Policy
 
@@ -35,7 +34,7 @@ class MapperSettings:
     device: Any = None
 
 
-_DECLARED = declared(RenderOptions, DrawingOptions)
+_DECLARED = RenderOptions.declared | DrawingOptions.declared
 
 #: The settings, by VTK's names.
 SETTINGS: Mapping[str, Option] = {
@@ -50,7 +49,7 @@ SETTINGS: Mapping[str, Option] = {
         1.0,
         "for how many pixels along each edge a ray is cast, 1 to 100",
         "The picture is interpolated linearly, as by VTK's mappers.",
-        check=Number("a number from 1 to 100", 1, 100, name="the image sample distance"),
+        check=Number(low=1, high=100, name="the image sample distance"),
     ),
     "AutoAdjustSampleDistances": Option(
         "adjust",

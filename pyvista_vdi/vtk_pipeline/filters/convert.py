@@ -216,7 +216,7 @@ def vdi_to_image(vdi: VDI | DeferredVDI) -> vtk.vtkImageData:
         arrays share the VDI's memory, so they must not be written to. A ``.vti`` file keeps every
         bit.
     """
-    lists: VDI = vdi.with_precision("exact").lists
+    lists = vdi.with_precision("exact")
     kept = {"deferred": vdi.about} if isinstance(vdi, DeferredVDI) else {}
     width, height = lists.window_size
     image = vtk.vtkImageData()
@@ -225,7 +225,7 @@ def vdi_to_image(vdi: VDI | DeferredVDI) -> vtk.vtkImageData:
     image.GetPointData().SetScalars(to_vtk(COUNT, counts))
     field = image.GetFieldData()
     for name in _RAGGED:
-        field.AddArray(to_vtk(name, getattr(lists, name)))
+        field.AddArray(to_vtk(name, getattr(lists.arrays, name)))
     # Everything that is not an array, as a field string of JSON
     about = {
         "form_version": FORM_VERSION if kept else 1,

@@ -23,6 +23,7 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import (
@@ -496,7 +497,7 @@ for _told in GenerationOptions.declared.values():
 
 
 def input_of(data: Any) -> Input:
-    """Return what to draw for a VDI, an image of one, a port, or what extensions show."""
+    """Return what to draw for a VDI, an image of one, a port, a series or a set."""
     if isinstance(data, vtkAlgorithmOutput):
         producer = data.GetProducer()
         if isinstance(producer, VDISource):
@@ -508,9 +509,8 @@ def input_of(data: Any) -> Input:
         return data
     if isinstance(data, VDI | DeferredVDI) or is_vdi_image(data):
         return Input(as_vdi(data))  # of values this raises, and says what to do
-    show = registry.shown(data)
-    if show is not None:
-        return show(data)  # type: ignore[no-any-return]
+    if isinstance(data, VDICollection):
+        return registry.load(data.drawn_by)(data)  # type: ignore[no-any-return]
     raise InvalidVDIError(
         f"a VDIMapper draws a VDI, its canonical image, a series, a set or a VDISource's output; "
         f"got {type(data).__name__}: put a VDISource between a volume and the mapper"
