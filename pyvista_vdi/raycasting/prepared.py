@@ -17,7 +17,7 @@ from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import lists_are_far
 from pyvista_vdi.model.packing import Packed8
-from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, Media, made_vdi
+from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, made_vdi
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.classified_values import ValuesLook
 from pyvista_vdi.volume.upload import release_voxels
