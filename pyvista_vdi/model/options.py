@@ -219,11 +219,6 @@ class GenerationOptions(MediumOptions):
     precision: Precision = "exact"
 
     @property
-    def hidden_weight(self) -> float:
-        """Weight of what V_O cannot see at all when neighbours are merged, 0 to 1."""
-        return float(1 - np.cos(np.radians(self.view_cone)))
-
-    @property
     def finest_error(self) -> float:
         """Merge error up to which neighbours are always merged."""
         # Differences stay below 1e18, whose square float32 still holds
