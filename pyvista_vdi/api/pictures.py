@@ -41,7 +41,7 @@ def render(
     *,
     clipping_planes: ArrayLike | Sequence[ArrayLike | None] | None = None,
     cropping: CroppingLike | None = None,
-    opacity_multiplier: float | Sequence[float] = 1.0,
+    opacity_multiplier: float | Sequence[float] = RenderOptions.opacity_multiplier,
     opaque_depth: ArrayLike | None = None,
     model_transforms: Sequence[ArrayLike] | None = None,
     device: DeviceLike | None = None,

@@ -61,9 +61,6 @@ QUALITIES: dict[str, float | None] = {
     "fast": 0.93,
 }
 
-#: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
-_INDISTINGUISHABLE = 1e-6
-
 
 @dataclass
 class Option:
@@ -98,7 +95,8 @@ class Option:
             self.standard = self.check(self.default)
 
 
-#: What the docstring of a record says of a field: its name, ``what``, and ``more``.
+#: What the docstring of a record says of a field: its name, ``what``, and ``more``. Where Python
+#: drops docstrings (-OO) options are not described, and all else is as it is.
 _TEXT = re.compile(r"^(\w+): (.+)((?:\n +.+)*)", re.MULTILINE)
 
 
@@ -221,8 +219,9 @@ class GenerationOptions(MediumOptions):
     @property
     def finest_error(self) -> float:
         """Merge error up to which neighbours are always merged."""
-        # Differences stay below 1e18, whose square float32 still holds
-        return max(min(self.tolerance, 1e18) ** 2, _INDISTINGUISHABLE)
+        # Differences stay below 1e18, whose square float32 still holds, and no picture shows one of
+        # a thousandth of full opacity over one voxel
+        return max(min(self.tolerance, 1e18) ** 2, 1e-6)
 
 
 @dataclass(frozen=True)
