@@ -40,6 +40,16 @@ SCALARS: dict[str, np.dtype[Any]] = {
 }
 
 
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+_STRUCTURE = re.compile(r"typedef struct\s*\{([^}]*)\}\s*(\w+);")
+_PARAMETERS = re.compile(r"#define (\w+_PARAMETERS)((?:[^\n]*\\\n)*[^\n]*)")
+_INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]')
+_QUALIFIERS = {"__global", "__local", "__constant", "const", "volatile", "restrict"}
+
+_logger = logging.getLogger(__name__)
+_kernel_lock = threading.RLock()
+
+
 class Parameter(NamedTuple):
     """An argument of a compiled kernel: its place, and its type in OpenCL C and in NumPy.
 
@@ -135,17 +145,6 @@ def _dtype(kind: str, known: Mapping[str, np.dtype[Any]]) -> np.dtype[Any] | Non
     return number if number is None or count == 1 else np.dtype((number, (count,)))
 
 
-_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
-_STRUCTURE = re.compile(r"typedef struct\s*\{([^}]*)\}\s*(\w+);")
-_PARAMETERS = re.compile(r"#define (\w+_PARAMETERS)((?:[^\n]*\\\n)*[^\n]*)")
-
-
-_QUALIFIERS = {"__global", "__local", "__constant", "const", "volatile", "restrict"}
-
-
-_INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]')
-
-
 def read_resource(path: str) -> str:
     """Return the text of a file of the package ``pyvista_vdi.opencl``: ``"lib/rays.cl"``, say."""
     return files("pyvista_vdi.opencl").joinpath(path).read_text(encoding="utf-8")
@@ -183,10 +182,6 @@ def _with_includes(name: str, text: str | None = None) -> str:
 
     append(name, read_resource(name) if text is None else text)
     return "\n".join([*definitions(), *lines]) + "\n"
-
-
-_logger = logging.getLogger(__name__)
-_kernel_lock = threading.RLock()
 
 
 class Kernel:

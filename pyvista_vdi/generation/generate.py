@@ -1,5 +1,6 @@
 """Volume to VDI, on a device: rays are marched, what they record is merged, and packed."""
 
+from contextlib import ExitStack, nullcontext
 from dataclasses import asdict
 from typing import Any
 
@@ -7,11 +8,11 @@ from pyvista_vdi._version import __version__
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.errors import Cancelled
 from pyvista_vdi.generation.list_arrays import GrowingLists
-from pyvista_vdi.generation.march import March, Records
-from pyvista_vdi.generation.slices import Slices
+from pyvista_vdi.generation.march import CHUNK_STEPS, March, Records, Slices
 from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.types import Progress
 from pyvista_vdi.model.vdi import VDI, made_vdi
+from pyvista_vdi.volume.bricks import SAMPLE_BYTES, Room
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import GridRays
 
@@ -34,22 +35,18 @@ def generate_vdi(request: GenerationRequest) -> VDI:
     report(progress, 0.0)  # first: a bar says that kernels are compiled
     runtime = get_runtime(request.device)
     slices = Slices(runtime, size, options)
-    medium = DeviceVolume(
-        runtime, volume, request.transfer_function, options, room=slices.room(volume)
-    )
-    with (
-        medium.giving_bricks_back(),
-        Records(runtime, medium.rays, camera, size, slices, options) as records,
-        March(records, medium, camera) as march,
-        GrowingLists(
-            runtime,
-            size,
-            options.max_supersegments,
-            slices.rows * width,
-            stay=options.memory_limit is None,
-        ) as lists,
-    ):
-        for part in slices:
+    beside = slices.bytes + options.occlusion_bytes(volume)
+    samples = slices.items * CHUNK_STEPS * SAMPLE_BYTES
+    room = Room(options.memory_limit, beside, samples, slices.text)
+    medium = DeviceVolume(runtime, volume, request.transfer_function, options, room=room)
+    limit, stay = options.max_supersegments, options.memory_limit is None
+    with ExitStack() as stack:
+        keep = stack.enter_context
+        keep(medium.bricks or nullcontext())
+        records = Records(runtime, medium.rays, camera, size, slices, options, keep)
+        march = March(records, medium, camera, keep)
+        lists = keep(GrowingLists(runtime, size, limit, slices.rows * width, stay=stay))
+        for part in slices.parts:
             records.begin(part)
             # Sample the rays' steps, merge what is alike, and make room in records that are full
             for chunk in march.chunks(part):
@@ -57,12 +54,10 @@ def generate_vdi(request: GenerationRequest) -> VDI:
                 records.make_room(last=chunk.last)
             # Fit each record to the budget
             records.fit()
-            if part.number > 0:
-                lists.wait()  # for the slice before: the device has this one to go on with
-                report(progress, part.first_row / height)
             # Pack the lists behind those made before
             records.pack(lists)
-        arrays = lists.staying()
+            report(progress, part.first_row / height)
+        arrays = lists.finished()
     report(progress, 1.0)
     return made_vdi(
         arrays,
@@ -70,13 +65,11 @@ def generate_vdi(request: GenerationRequest) -> VDI:
         window_size=size,
         bounds=volume.bounds,
         depth_origin=records.depth_origin,
-        metadata={**made_from(request, medium, runtime.info.name), **request.metadata},
+        metadata={**made_from(request, medium.rays, runtime.info.name), **request.metadata},
     ).with_precision(options.precision)
 
 
-def made_from(
-    request: GenerationRequest, medium: DeviceVolume | GridRays, device: str
-) -> dict[str, Any]:
+def made_from(request: GenerationRequest, rays: GridRays, device: str) -> dict[str, Any]:
     """Return what made a VDI, for its metadata."""
     volume, options = request.volume, request.options
     transfer_function = request.transfer_function
@@ -86,8 +79,8 @@ def made_from(
         "max_supersegments": options.max_supersegments,
         "tolerance": options.tolerance,
         "view_cone": options.view_cone,
-        "sample_distance": medium.sample_distance,
-        "opacity_unit_distance": medium.unit_distance,
+        "sample_distance": rays.sample_distance,
+        "opacity_unit_distance": rays.unit_distance,
         "transfer_function": transfer_function.to_dict(),
         "volume": {
             "name": volume.name,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together
 from pyvista_vdi.device.constants import GROUP, LISTS_PER_ITEM
-from pyvista_vdi.model.host_memory import GrowingArray, aligned_empty, require_host_memory
+from pyvista_vdi.model.host_memory import aligned_empty, cut_to, require_host_memory, with_room
 from pyvista_vdi.model.packing import Arrays
 
 #: A VDI's arrays of supersegments, as kernels and as messages call them, and an element's shape.
@@ -26,6 +26,8 @@ SUPERSEGMENT_BYTES, _LARGEST_ELEMENT = 24, 12
 
 #: Share of a device's own memory that lists may take there.
 _SHARE = 16
+#: Lists whose lengths a work-group sums up.
+LISTS_PER_GROUP = GROUP * LISTS_PER_ITEM
 
 
 class ListsOnDevice:
@@ -115,24 +117,23 @@ class GrowingLists(contextlib.AbstractContextManager["GrowingLists"]):
         *,
         stay: bool = False,
     ) -> None:
-        self._runtime, self._size, self._limit = runtime, size, limit
+        self._runtime, self._size, self._limit, self._stay = runtime, size, limit, stay
         self._most = size[0] * size[1] * limit  # supersegments
         self._made = 0  # lists, those of the last slice included
-        self._known = 0  # supersegments of all lists whose sum is known here
-        self._require_room()
-        self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
-        self._begin = self._end = 0  # supersegments that the buffers hold
         self._wait: Callable[[], None] | None = None  # for the sum with the last slice
         self._sum = np.zeros(1, np.uint64)
-        self._arrays = {name: GrowingArray(item) for name, (_, item) in _ARRAYS.items()}
+        self._summed_up()  # refuses what lists without supersegments take already
+        self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
+        self._begin = self._end = 0  # supersegments that the buffers hold
+        self._arrays = {name: aligned_empty((0, *item)) for name, (_, item) in _ARRAYS.items()}
         self._targets: dict[str, DeviceBuffer] = {}
         # Supersegments that a device's own buffers have room for
         self._largest = runtime.info.max_allocation // _LARGEST_ELEMENT
         share = runtime.info.global_memory // (_SHARE * SUPERSEGMENT_BYTES) if stay else 0
         self._room = max(slice_lists * limit, min(share, self._largest, self._most))
-        bring_to_host(runtime, SUPERSEGMENT_BYTES * self._room)
         with kept_together() as keep:
-            sums = keep(runtime.buffer((blocks_to_sum(slice_lists),), np.uint64, "sums of lengths"))
+            groups = -(-slice_lists // LISTS_PER_GROUP)
+            sums = keep(runtime.buffer((groups,), np.uint64, "sums of lengths"))
             place = self._offsets
             offsets = keep(runtime.result(place.shape, np.uint64, "list offsets", out=place))
             runtime.fill(offsets, 0, 1)
@@ -142,84 +143,70 @@ class GrowingLists(contextlib.AbstractContextManager["GrowingLists"]):
                 "generation/offsets.cl", "list_offsets", **shared, all_offsets=offsets
             )
             self._sums, self._starts = sums, offsets
-            try:
-                self._make_room(0, 1)
-            except BaseException:
-                self._release_targets()
-                raise
 
     def __exit__(self, *_: object) -> None:
-        self._release_targets()
-        for buffer in (self._sums, self._starts):
+        for buffer in (self._sums, self._starts, *self._targets.values()):
             buffer.release()
 
     def follow(self, lengths: DeviceBuffer, n: int) -> dict[str, Any]:
         """Find where the next n lists go, of which there are so many lengths, on the device.
 
-        Returns the arguments ``offsets`` to ``optical_depths`` of the kernel ``pack_lists``.
+        It waits for the slice before: the device has this one to go on with. Returns the arguments
+        ``offsets`` to ``optical_depths`` of the kernel ``pack_lists``.
         """
-        self.wait()
-        items, made = blocks_to_sum(n) * GROUP, self._made
+        known = self._summed_up()
+        if not self._targets:
+            self._make_room(0, 1)
+        items, made = -(-n // LISTS_PER_GROUP) * GROUP, self._made
         self._sum_lengths(items, GROUP, lists=n, lengths=lengths)
         self._place_lists(items, GROUP, lists=n, lengths=lengths, made=made)
         self._made += n
         self._wait = self._runtime.download_later(self._starts, self._sum, first=self._made)
-        if self._known + n * self._limit > self._end:
-            self.wait()
+        if known + n * self._limit > self._end and (end := self._summed_up()) > self._end:
+            self._make_room(known, end)
         return {"offsets": self._starts, "made": made, "held": self._begin, **self._targets}
 
-    def wait(self) -> None:
-        """Wait until the lengths of the last slice are summed up."""
-        if self._wait is None:
-            return
-        self._wait()
-        self._wait = None
-        begin, self._known = self._known, int(self._sum[0])
-        self._require_room()
-        if self._known > self._end:
-            self._make_room(begin, self._known)
-
-    def _require_room(self) -> None:
-        """Refuse to go on where the host cannot hold what is known of the VDI."""
-        width, height = self._size
+    def _summed_up(self) -> int:
+        """Wait for the number of supersegments of all lists made; refuse what the host lacks."""
+        if self._wait is not None:
+            self._wait()
+        known, (width, height) = int(self._sum[0]), self._size
         require_host_memory(
-            self._known * SUPERSEGMENT_BYTES + 8 * width * height,
+            known * SUPERSEGMENT_BYTES + 8 * width * height,
             f"a VDI of {width} x {height} lists",
             "lower the window size or max_supersegments, or raise tolerance",
         )
+        return known
 
-    def finished(self) -> Arrays:
-        """Return the arrays, on the host."""
-        self.wait()
-        self._runtime.download(self._starts, self._offsets)
-        self._collect(self._known)
-        return Arrays(self._offsets, *(a.finished(self._known) for a in self._arrays.values()))
-
-    def staying(self) -> Arrays | ListsOnDevice:
-        """Return lists that stay in the device's own memory, or the arrays where they are not."""
-        self.wait()
-        if self._begin > 0 or self._runtime.in_place_alignment is not None:
-            return self.finished()
-        buffers, self._targets = {"starts": self._starts, **self._targets}, {}
-        self._starts = self._sums  # all that is to be released
-        return ListsOnDevice(self._runtime, self._offsets, self._known, buffers)
+    def finished(self) -> Arrays | ListsOnDevice:
+        """Return the arrays, on the host, or lists that stay in the device's own memory."""
+        runtime, n = self._runtime, self._summed_up()
+        if self._stay and self._begin == 0 and runtime.in_place_alignment is None:
+            buffers, self._targets = {"starts": self._starts, **self._targets}, {}
+            self._starts = self._sums  # all that is to be released
+            return ListsOnDevice(runtime, self._offsets, n, buffers)
+        runtime.download(self._starts, self._offsets)
+        self._collect(n)
+        return Arrays(self._offsets, *(cut_to(array, n) for array in self._arrays.values()))
 
     def _make_room(self, begin: int, end: int) -> None:
         """Make buffers of the supersegments from ``begin``, those made so far, to ``end``."""
         self._collect(begin)
         alignment = self._runtime.in_place_alignment
         if alignment is None:
-            for name, (what, item) in {} if self._targets else _ARRAYS.items():
-                self._targets[name] = self._runtime.buffer((self._room, *item), name=what)
+            if not self._targets:
+                bring_to_host(self._runtime, SUPERSEGMENT_BYTES * self._room)
+                for name, (what, item) in _ARRAYS.items():
+                    self._targets[name] = self._runtime.buffer((self._room, *item), name=what)
             self._begin, self._end = begin, begin + self._room
             return
-        for array in self._arrays.values():
-            array.reserve(end, self._most)
+        for name, array in self._arrays.items():
+            self._arrays[name] = with_room(array, end, self._most)
         begin -= begin % alignment  # so many elements are aligned as well
-        room = min(len(grown.array) for grown in self._arrays.values())
+        room = min(map(len, self._arrays.values()))
         self._begin, self._end = begin, max(end, min(room, begin + self._largest))
-        for name, grown in self._arrays.items():
-            part = grown.array[begin : self._end]
+        for name, array in self._arrays.items():
+            part = array[begin : self._end]
             target = self._runtime.result(part.shape, name=_ARRAYS[name][0], out=part)
             self._targets[name] = target
 
@@ -227,18 +214,9 @@ class GrowingLists(contextlib.AbstractContextManager["GrowingLists"]):
         """Wait until so many supersegments are in the host's arrays; in place, release buffers."""
         in_place = self._runtime.in_place_alignment is not None
         for name, target in self._targets.items():
-            if not in_place:
-                self._arrays[name].reserve(made, self._most)
-            self._runtime.download(target, self._arrays[name].array[self._begin : made])
+            array = self._arrays[name] = with_room(self._arrays[name], made, self._most)
+            self._runtime.download(target, array[self._begin : made])
+            if in_place:
+                target.release()
         if in_place:
-            self._release_targets()
-
-    def _release_targets(self) -> None:
-        for target in self._targets.values():
-            target.release()
-        self._targets = {}
-
-
-def blocks_to_sum(lists: int) -> int:
-    """Return the work-groups that sum up the lengths of so many lists."""
-    return -(-lists // (GROUP * LISTS_PER_ITEM))
+            self._targets = {}

@@ -1,7 +1,6 @@
-"""Records of a slice's rays: marched and merged, fitted to the budget, and packed."""
+"""Slices of rays and their records: marched and merged, fitted to the budget, and packed."""
 
-from collections.abc import Mapping
-from contextlib import AbstractContextManager, ExitStack
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -11,17 +10,84 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from pyvista_vdi.device import DeviceBuffer, Runtime
 from pyvista_vdi.device.constants import GROUP, RUN_WORDS, block_items
-from pyvista_vdi.generation.list_arrays import GrowingLists
-from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
+from pyvista_vdi.generation.list_arrays import LISTS_PER_GROUP, SUPERSEGMENT_BYTES, GrowingLists
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import GenerationOptions
-from pyvista_vdi.model.ray_forms import Floats, Rectangle, check_list_space
+from pyvista_vdi.model.ray_forms import Floats, Rectangle, check_list_space, packed
 from pyvista_vdi.volume.bricks import StepSampler
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.rays import GridRays, RayLaunch
 
+#: Steps of a ray between two looks at the length of its record.
+CHUNK_STEPS = 128
+#: The same before the first look: few, so that rays which cannot keep every detail learn it soon.
+_FIRST_CHUNK_STEPS = 64
+#: Tiles across a window, and at least as many up it, in each of which the longest ray is found.
+_TILES = 16
+#: Bytes of one recorded run on the device, and of its merge error.
+_RUN_BYTES = (RUN_WORDS + 1) * 4
+#: Bytes of runs that one slice of rays records at a time; also how often progress is reported. On a
+#: GPU a share of its memory: a window's rays are few for one (docs/decisions/gpu.md).
+_SLICE_BYTES = 96 * 2**20
+_SLICES_IN_GPU = 16
+#: Slices that a memory limit has room for: the volume gets more than they do.
+_SLICES_IN_LIMIT = 4
+#: Runs that a ray's record keeps for homogeneity: more than a ray through most data has, so that it
+#: cuts what was sampled and not what least error has left of it.
+_UNMERGED_RUNS = 512
 
-class Records(AbstractContextManager["Records"]):
+#: Keeps what is made for a march until it is done (``ExitStack.enter_context``), and returns it.
+Keep = Callable[[Any], Any]
+
+
+class Slice(NamedTuple):
+    """Rows of lists that are made together."""
+
+    number: int
+    first_row: int
+    rows: int
+
+
+class Slices:
+    """The slices of a window, and the buffers that one of them takes.
+
+    ``more`` runs are recorded of a ray, at most, between two looks at the length of its record,
+    which is shortened to ``kept`` runs then and has room for ``capacity``. A slice has ``rows``
+    rows of lists, the last one maybe fewer, and ``items`` work-items; ``bytes`` are on the device,
+    of records, lists and all else but the volume, and ``text`` says of what, for messages.
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        size: tuple[int, int],
+        options: GenerationOptions,
+        more: int = CHUNK_STEPS,
+    ) -> None:
+        limit = options.max_supersegments
+        # Twice the budget: the records' thresholds then stay well below the final merges' errors
+        self.kept = max(2 * limit, limit + 12)
+        if options.criterion == "homogeneity":
+            self.kept = max(self.kept, _UNMERGED_RUNS)
+        self.capacity = self.kept + more
+        width, height = size
+        most = _SLICE_BYTES
+        if not runtime.is_cpu:
+            most = max(most, runtime.info.global_memory // _SLICES_IN_GPU)
+        if options.memory_limit is not None:
+            most = min(most, options.memory_limit // _SLICES_IN_LIMIT)
+        per_block_row = block_items(width, 4) * self.capacity * _RUN_BYTES
+        self.rows = min(height, 4 * max(1, most // per_block_row))
+        self.items = block_items(width, self.rows)
+        lists = self.rows * width
+        arrays = lists * (limit * SUPERSEGMENT_BYTES + 8) + 8 + 8 * -(-lists // LISTS_PER_GROUP)
+        self.bytes = self.items * (self.capacity * _RUN_BYTES + 8) + arrays
+        self.text = f"{self.rows} rows of {width} lists of up to {limit} supersegments"
+        firsts = range(0, height, self.rows)
+        self.parts = [Slice(n, y, min(self.rows, height - y)) for n, y in enumerate(firsts)]
+
+
+class Records:
     """A ray per list, and the runs of like samples that are recorded along each of a slice's rays.
 
     ``rays`` are marched through the ``window``, all or part of V_O's window of ``size``, which
@@ -29,7 +95,7 @@ class Records(AbstractContextManager["Records"]):
     merge error that each accepts (``thresholds``: ``finest`` until its record has been full), and
     how many runs it has (``counts``). ``march`` has the rays in float64, ``view`` the numbers of a
     slice's rays (``RaysOfView``), ``recording`` those of the records, which are shortened to what
-    is kept between chunks of a march.
+    is kept between chunks of a march. The caller releases buffers, which ``keep`` is given.
     """
 
     def __init__(
@@ -40,6 +106,7 @@ class Records(AbstractContextManager["Records"]):
         size: tuple[int, int],
         slices: Slices,
         options: GenerationOptions,
+        keep: Keep,
         window: Rectangle | None = None,
     ) -> None:
         check_list_space(camera, rays.grid.bounds)
@@ -66,14 +133,11 @@ class Records(AbstractContextManager["Records"]):
         self.recording = {**numbers, "limit": slices.kept}
         self._budget = {**numbers, "limit": options.max_supersegments}
         items, capacity = slices.items, slices.capacity
-        with ExitStack() as stack:
-            keep = stack.enter_context
-            self.forms = keep(runtime.upload(march.packed(), "rays", brief=True))
-            self.runs = keep(runtime.buffer((items, capacity, RUN_WORDS), name="recorded runs"))
-            self.errors = keep(runtime.buffer((items, capacity), name="merge errors"))
-            self.thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
-            self.counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))
-            self._buffers = stack.pop_all()
+        self.forms = keep(runtime.upload(packed(march.forms), "rays", brief=True))
+        self.runs = keep(runtime.buffer((items, capacity, RUN_WORDS), name="recorded runs"))
+        self.errors = keep(runtime.buffer((items, capacity), name="merge errors"))
+        self.thresholds = keep(runtime.buffer((items,), name="merge thresholds"))
+        self.counts = keep(runtime.buffer((items,), np.uint32, "list lengths"))
         records: dict[str, Any] = {"forms": self.forms, "records": self.runs}
         self._shorten = RayLaunch(
             runtime,
@@ -96,9 +160,6 @@ class Records(AbstractContextManager["Records"]):
             )
         records |= {"double_float": march.double_float, "capacity": capacity}
         self._pack = runtime.bind("generation/pack_lists.cl", "pack_lists", **records)
-
-    def __exit__(self, *_: object) -> None:
-        self._buffers.close()
 
     def begin(self, part: Slice) -> None:
         """Forget the slice before, and begin another."""
@@ -132,15 +193,6 @@ class Records(AbstractContextManager["Records"]):
         self._pack(self.items, GROUP, view=self.view, **places)
 
 
-#: Steps of a ray before the first look at the length of its record: few, so that rays which cannot
-#: keep every detail learn it soon.
-_FIRST_CHUNK_STEPS = 64
-
-
-#: Tiles across a window, and at least as many up it, in each of which the longest ray is found.
-_TILES = 16
-
-
 class Chunk(NamedTuple):
     """Steps that all rays of a slice march before their records are looked at."""
 
@@ -149,7 +201,7 @@ class Chunk(NamedTuple):
     last: bool
 
 
-class March(AbstractContextManager["March"]):
+class March:
     """Marches the rays of slices, a chunk of steps at a time.
 
     ``entering``: the light that enters part of a grid along each ray of the window, 0 to 1.
@@ -160,6 +212,7 @@ class March(AbstractContextManager["March"]):
         records: Records,
         medium: DeviceVolume,
         camera: Camera,
+        keep: Keep,
         entering: DeviceBuffer | None = None,
     ) -> None:
         self._records, self._most_steps = records, medium.most_steps
@@ -170,33 +223,26 @@ class March(AbstractContextManager["March"]):
             medium.variant, double_float=records.march.double_float, compensated=compensated
         )
         self._longest = self._longest_rays(arguments["classified"], medium.sample_distance)
-        with ExitStack() as stack:
-            self._sampler = None
-            if medium.bricks is not None:
-                room = records.slices.items * CHUNK_STEPS
-                sampler = StepSampler(
-                    runtime, medium.bricks, arguments, variant, records.forms, room
-                )
-                self._sampler = stack.enter_context(sampler)
-            self._launch = RayLaunch(
-                runtime,
-                "generation/march_lists.cl",
-                "march_lists",
-                variant.defines,
-                one_by_one=variant.one_by_one or medium.bricks is not None,
-                **arguments,
-                forms=records.forms,
-                samples=self._sampler and self._sampler.samples,
-                recording=records.recording,
-                entering=entering,
-                thresholds=records.thresholds,
-                records=records.runs,
-                counts=records.counts,
-            )
-            self._buffers = stack.pop_all()
-
-    def __exit__(self, *_: object) -> None:
-        self._buffers.close()
+        self._sampler = None
+        if medium.bricks is not None:
+            room = records.slices.items * CHUNK_STEPS
+            sampler = StepSampler(runtime, medium.bricks, arguments, variant, records.forms, room)
+            self._sampler = keep(sampler)
+        self._launch = RayLaunch(
+            runtime,
+            "generation/march_lists.cl",
+            "march_lists",
+            variant.defines,
+            one_by_one=variant.one_by_one or medium.bricks is not None,
+            **arguments,
+            forms=records.forms,
+            samples=self._sampler and self._sampler.samples,
+            recording=records.recording,
+            entering=entering,
+            thresholds=records.thresholds,
+            records=records.runs,
+            counts=records.counts,
+        )
 
     def chunks(self, part: Slice) -> list[Chunk]:
         """Return the chunks that reach the end of a slice's longest ray."""
@@ -223,7 +269,7 @@ class March(AbstractContextManager["March"]):
         """
         records = self._records
         (x0, x1, y0, y1), (width, height) = records.window, records.size
-        slices, rows = len(records.slices), records.slices.rows
+        slices, rows = len(records.slices.parts), records.slices.rows
         high = -(-_TILES // slices)  # tiles in a slice
         y = np.minimum(y0 + np.arange(slices * high + 1) * rows / high, y1) - height / 2
         b, a = np.meshgrid(y, np.linspace(x0, x1, _TILES + 1) - width / 2, indexing="ij")

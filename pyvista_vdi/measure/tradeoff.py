@@ -72,13 +72,6 @@ def sweep(axes: Mapping[str, Sequence[Any]] | None = None) -> list[Setting]:
     return [{}, *({name: value} for name, values in chosen.items() for value in values)]
 
 
-def _check(setting: Setting) -> None:
-    """Refuse an unknown name, or a value out of its range."""
-    if not 0.05 <= (value := setting.get("lists", 1.0)) <= 8:
-        raise InvalidArgumentError(f"lists must be from 0.05 to 8; got {value!r}")
-    GenerationOptions(**{name: value for name, value in setting.items() if name != "lists"})
-
-
 @dataclass(frozen=True)
 class Point:
     """One setting's figures over all angles.
@@ -219,8 +212,10 @@ def measure_tradeoff(
             f"{size[0]} x {size[1]} pixels have no SSIM: {SSIM_WINDOW} or more are needed each way"
         )
     settings = sweep() if settings is None else settings
-    for setting in settings:
-        _check(setting)
+    for setting in settings:  # refuse an unknown name, or a value out of its range
+        if not 0.05 <= (lists := setting.get("lists", 1.0)) <= 8:
+            raise InvalidArgumentError(f"lists must be from 0.05 to 8; got {lists!r}")
+        GenerationOptions(**{name: value for name, value in setting.items() if name != "lists"})
     table = looks.transfer_function_of(volume)
     vtk = find_spec(BACKEND) is not None if vtk is None else vtk
     plan: dict[str, Any] = {"name": name, "window_size": size, "angles": list(angles)}

@@ -58,8 +58,8 @@ class Number:
     name: str = ""
     none: bool = False
 
-    def __call__(self, value: Any) -> Any:
-        """Return a value as a float or an int; raises InvalidArgumentError."""
+    def __call__(self, value: Any, name: str = "") -> Any:
+        """Return a value as a float or an int; raises InvalidArgumentError, which names it."""
         if self.none and value is None:
             return None
         number = as_whole(value) if self.whole else as_number(value)
@@ -72,7 +72,7 @@ class Number:
             elif self.low > -math.inf:
                 wanted += f" above {self.low}" if self.open_ended else f", {self.low} or above"
             error = InvalidArgumentTypeError if math.isnan(number) else InvalidArgumentError
-            raise error(f"{self.name} must be {wanted}; got {value!r}")
+            raise error(f"{name or self.name} must be {wanted}; got {value!r}")
         return int(number) if self.whole else number
 
 

@@ -188,7 +188,7 @@ class MediumOptions(Options):
         """Return what the grid of the ambient occlusion takes on the device, bytes."""
         if self.ambient_occlusion is None:
             return 0
-        return OcclusionGrid.of(volume, self.ambient_occlusion).nbytes
+        return OcclusionGrid(volume, self.ambient_occlusion).nbytes
 
 
 @dataclass(frozen=True)

@@ -129,10 +129,6 @@ class Addition:
     deferral: Deferral
     drawing: DrawingOptions
 
-    def __post_init__(self) -> None:
-        if self.target:
-            refuse_settings(self.target, self.options)
-
     def refuse_with_a_vdi(self, looks: Mapping[str, Any] | None = None) -> None:
         """Refuse what only a volume can honour, of the arguments that are not their defaults.
 
@@ -170,6 +166,8 @@ def added(plotter: Any, volume: Any, asked: Addition) -> Any:
 
     Of blocks a list is returned.
     """
+    if asked.target:
+        refuse_settings(asked.target, asked.options)
     if isinstance(volume, vtkMultiBlockDataSet):
         return _blocks(plotter, pv.wrap(volume), asked)
     get_runtime(asked.making.device)  # a missing device is said here, not while a frame is drawn
@@ -202,19 +200,12 @@ def added(plotter: Any, volume: Any, asked: Addition) -> Any:
 
     # Make an actor that shows it
     actor, mapper = PlotterVDIActor(), _mapper(shown, asked, plotter.theme)
-    if shown.prop is not None:
-        actor.prop = shown.prop
-    thing = shown.thing if several is None else several
-    if isinstance(thing, VDISource):
-        mapper.SetInputConnection(thing.GetOutputPort())
-        thing.of_scene = True
-    else:
-        mapper.SetInputData(thing)
-        if shown.prop is not None:  # which classifies what keeps values
-            mapper.driver.input.prop = shown.prop
-        if isinstance(first, DeferredVDI):
-            mapper.driver.input.vdi()  # refuse now what cannot be classified, and warn once
+    mapper.SetInputData(shown.thing if several is None else several)
     actor.mapper = mapper
+    if shown.prop is not None:  # which classifies a volume, or values that are kept
+        actor.prop = shown.prop
+    if isinstance(first, DeferredVDI):
+        mapper.driver.input.vdi()  # refuse now what cannot be classified, and warn once
     matrix = asked.place.user_matrix
     actor.user_matrix = np.eye(4) if matrix is None else matrix
 
@@ -334,8 +325,8 @@ def _of_volume(volume: Any, asked: Addition, plotter: Any) -> _Shown:
     table = look.lookup_table(volume.array)
     prop = look.volume_property(table, volume.default_unit_distance, rgba=volume.rgba)
     look.light(prop)
-    source.SetLights(plotter.renderer)
-    source.SetVolumeProperty(prop)
+    source.of_scene = True
+    source.lit_by.Set(plotter.renderer)  # whose lights are looked at by whoever asks
     # As add_volume: values that come without a name have none
     title = volume.name if scalars is None or isinstance(scalars, str) else ""
     return _Shown(source, table, look.scalar_range(table, volume), title, prop, bar)

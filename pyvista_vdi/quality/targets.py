@@ -148,9 +148,7 @@ def generate_anywhere(
             view, size = request.camera, request.window_size
             loaded = request.volume.load(view, window_size=size)
             return generate_anywhere(request.replace(volume=loaded), target)
-        return registry.placed("generators", "blocks", missing="generating by blocks")(
-            request, client
-        )  # type: ignore[no-any-return]
+        return registry.method("generating by blocks")(request, client)  # type: ignore[no-any-return]
     if client is not None:
         raise InvalidArgumentError(
             f"client is for chunked volumes, and {name!r} is in memory: give a Volume of a "

@@ -236,13 +236,11 @@ def eye_from_centre(
 
 def _pixel_width(camera: Camera, size: tuple[int, int], bounds: Sequence[float]) -> float:
     """Root of what a pixel covers at mid-depth, model units; infinite behind the eye."""
-    near, far = rays.depth_range(camera, bounds)
-    if not camera.parallel_projection:
-        near = max(near, 0.0)
-        if far <= 0:
-            return math.inf
     pixel_rays = rays.pixel_rays(camera, size, bounds)
-    t = (near + far) / 2 - pixel_rays.reference_depth
+    near, far = pixel_rays.reference_depth, pixel_rays.depths[1]
+    if not camera.parallel_projection and far <= 0:
+        return math.inf
+    t = (near + far) / 2 - near
     _, across, up = pixel_rays.origin + t * pixel_rays.direction
     return math.sqrt(float(np.linalg.norm(np.cross(across, up))))
 

@@ -27,7 +27,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose, choose_merge
 from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.raycasting.raycast import enqueue, render_vdi
-from pyvista_vdi.raycasting.scene import OnDevice, Scene
+from pyvista_vdi.raycasting.scene import Scene
 
 _digests: weakref.WeakKeyDictionary[VDI, bytes] = weakref.WeakKeyDictionary()
 
@@ -202,25 +202,24 @@ def owned_image(
     the first that it meets. The picture is the same, to the last bit, in whatever order the VDIs
     are given.
     """
-    runtime = get_runtime(request.device)
-    scenes = []
-    for one in placed:
-        # All end at the same transmittance
-        options = one.options.replace(
-            transmittance_cutoff=TRANSMITTANCE_CUTOFF, preview_samples=None
-        )
-        own = request.replace(camera=one.camera, options=options)
-        scenes.append(Scene.of(prepared_vdi(runtime, one.vdi), own, segments=True))
-    order = canonical_order(placed, [scene.reference_depth for scene in scenes])
-    width, height = request.window_size
-    cells = _Cells.of(scenes, request.window_size)
+    runtime, scenes = get_runtime(request.device), []
     with contextlib.ExitStack() as stack:
-        on_device = [stack.enter_context(scene.on_device()) for scene in scenes]
-        image = stack.enter_context(runtime.result((height, width, 4), name="image"))
-        owner = stack.enter_context(runtime.result((height, width), np.int16, "owners"))
-        _draw_alone(runtime, scenes, on_device, cells, image, owner)
+        keep = stack.enter_context
+        for one in placed:
+            # All end at the same transmittance
+            options = one.options.replace(
+                transmittance_cutoff=TRANSMITTANCE_CUTOFF, preview_samples=None
+            )
+            own = request.replace(camera=one.camera, options=options)
+            scenes.append(Scene.of(prepared_vdi(runtime, one.vdi), own, keep, segments=True))
+        order = canonical_order(placed, [scene.reference_depth for scene in scenes])
+        width, height = request.window_size
+        cells = _Cells.of(scenes, request.window_size)
+        image = keep(runtime.result((height, width, 4), name="image"))
+        owner = keep(runtime.result((height, width), np.int16, "owners"))
+        _draw_alone(runtime, scenes, cells, image, owner)
         if len(cells.shared):
-            merged = _MergedCells(runtime, scenes, on_device, order, margin)
+            merged = _MergedCells(runtime, scenes, order, margin)
             slots = max(_slots.get(one.vdi, _FIRST_SLOTS) for one in placed)
             needed = merged.draw(cells.shared, slots, image, owner)
             for one in placed:
@@ -273,7 +272,6 @@ class _Cells:
 def _draw_alone(
     runtime: Runtime,
     scenes: Sequence[Scene],
-    on_device: Sequence[OnDevice],
     cells: _Cells,
     image: DeviceBuffer,
     owner: DeviceBuffer,
@@ -289,7 +287,7 @@ def _draw_alone(
         end_rays = runtime.bind("multi_vdi/cells.cl", "alone_ends", **window)
         take = runtime.bind("multi_vdi/cells.cl", "take_cells", **window, image=image, owner=owner)
         picture, ends = image, None  # others are drawn over the first one's picture
-        for number, (scene, (forms, opaque)) in enumerate(zip(scenes, on_device, strict=True)):
+        for number, scene in enumerate(scenes):
             part = cells.part(number, size)
             if not part.pixels:
                 continue
@@ -297,9 +295,8 @@ def _draw_alone(
                 ends = stack.enter_context(runtime.result(size[::-1], name="ends of rays"))
             elif picture is image:
                 picture = stack.enter_context(runtime.result(image.shape, name="one's picture"))
-            end_rays(items, group, vdi=number, opaque_depth=opaque, ends=ends)
-            scene = replace(scene, segments=False, only=part)
-            enqueue(scene, scene.arguments(forms, ends), picture)
+            end_rays(items, group, vdi=number, opaque_depth=scene.ends, ends=ends)
+            enqueue(replace(scene, segments=False, only=part, ends=ends), picture)
             take(items, group, vdi=number, picture=picture)
         if (cells.alone == cells.NOBODY).any():
             take(items, group, vdi=cells.NOBODY, picture=image)
@@ -316,7 +313,6 @@ class _MergedCells:
         self,
         runtime: Runtime,
         scenes: Sequence[Scene],
-        on_device: Sequence[OnDevice],
         order: Sequence[int],
         margin: float,
     ) -> None:
@@ -325,17 +321,17 @@ class _MergedCells:
         nearest = min(scene.reference_depth for scene in scenes)
         self._walks: list[tuple[Launch, int]] = []  # and how many rays a work-item follows
         for number, i in enumerate(order):
-            scene, variant = scenes[i], choose(runtime, scenes[i])
+            scene, variant = scenes[i], choose(scenes[i])
             launch = runtime.bind(
                 *variant.kernel,
                 variant.switches,
-                **scene.arguments(*on_device[i]),
+                **scene.arguments(),
                 number=number,
                 depth_shift=scene.reference_depth - nearest,
                 margin=margin,
             )
             self._walks.append((launch, variant.rays))
-        merge = choose_merge(runtime, scenes)
+        merge = choose_merge(scenes)
         self._merged_rays = merge.rays
         self._merge = runtime.bind(
             *merge.kernel,

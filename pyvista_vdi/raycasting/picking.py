@@ -190,7 +190,7 @@ class _Ray:
         """Return first and last t where there may be a medium; ``None`` where there is none."""
         planes = request.options.clipping_planes
         of_view = rays.view_planes(request.camera, self.window, planes)
-        table = np.asarray(rays.box_planes(self.window, vdi.bounds) + of_view)
+        table = np.vstack([rays.box_planes(self.window, vdi.bounds), of_view])
         (u, v, depth, d), (du, dv, ddepth, dd) = self.at, self.slope
         value = [*(table[:, :3] @ self.pixel), d + u, d - u, d + v, d - v]
         slope = [*(table[:, 3:] @ self.pixel), dd + du, dd - du, dd + dv, dd - dv]

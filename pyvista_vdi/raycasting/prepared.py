@@ -16,9 +16,9 @@ from pyvista_vdi.device.constants import BUNDLE, GROUP, LIST_HEADER, LISTS_PER_I
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import lists_are_far
-from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, ValuesLook, made_vdi
+from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, made_vdi
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting.packets import share_lit
+from pyvista_vdi.raycasting.classified_values import ValuesLook
 from pyvista_vdi.volume.upload import release_voxels
 
 #: Squares of stacks along the grid's longer edge: `OccupancyGrid.corners` has a box for each.
@@ -36,6 +36,11 @@ _WORTHWHILE, _WORTHWHILE_ON_GPU = 0.8, 1 / 3
 #: Far depth over near depth up to which a lens counts as long, and depth is kept relative.
 _LONG_LENS = 2.0
 
+#: Lists of a VDI that are asked how far light gets in them; of values, which are classified for it.
+_SAMPLED_LISTS, _SAMPLED_LISTS_OF_VALUES = 4096, 1024
+#: Optical depth behind which nothing is left of light: -log(1e-6), where rays end by default.
+_DARK = 13.8
+
 #: A VDI's arrays, as kernels and as messages call them; kernels that count take the first three.
 _ARRAYS = {
     "starts": "list offsets",
@@ -46,9 +51,7 @@ _ARRAYS = {
 }
 _COUNTED = ("starts", "fronts", "backs")
 #: What media are made of: colours and optical depths, or a deferred VDI's values.
-_NO_MEDIA = dict.fromkeys(
-    ("colors", "optical_depths", "means", "spreads", "steps", "integrals"), None
-) | {"cells": 0}
+_NO_MEDIA = dict.fromkeys(("colors", "optical_depths", "means", "spreads", "steps", "integrals"))
 
 #: Keeps a buffer until all are made (:func:`pyvista_vdi.device.kept_together`), and returns it.
 Keep = Callable[[DeviceBuffer], DeviceBuffer]
@@ -187,6 +190,36 @@ def _share_in_bounds(
     return float(np.maximum(last - first, 0).mean() / depth) if depth > 0 else 0.0
 
 
+def _share_lit(vdi: VDI, near: float, far: float, look: ValuesLook | None = None) -> float:
+    """Return how much of the depths from ``near`` to ``far`` light gets through, the lists' mean.
+
+    Of some of the lists that are not empty; 1 in a list through which it gets. View depths of V_O.
+    ``look``: has the media that are shown, where they are others than the VDI's.
+    """
+    offsets = vdi.offsets.view(np.int64)
+    lists = np.flatnonzero(np.diff(offsets))
+    sampled = _SAMPLED_LISTS if look is None else _SAMPLED_LISTS_OF_VALUES
+    lists = lists[:: -(-len(lists) // sampled) or 1]
+    if not len(lists):
+        return 1.0
+    counts = offsets[lists + 1] - offsets[lists]
+    begins = np.cumsum(counts) - counts
+    places = np.arange(counts.sum()) + np.repeat(offsets[lists] - begins, counts)
+    optical_depth = vdi.optical_depth[places] if look is None else look.media_of(places)[1]
+    optical_depth = optical_depth.astype(np.float64)
+    before = np.cumsum(optical_depth) - optical_depth
+    before -= np.repeat(before[begins], counts)
+    last = begins + np.add.reduceat(before < _DARK, begins) - 1  # that light gets to
+    left = (_DARK - before[last]) / np.maximum(optical_depth[last], np.finfo(np.float32).tiny)
+    front, back = (faces[places[last]].astype(np.float64) for faces in (vdi.front, vdi.back))
+    depth = front + np.minimum(left, 1.0) * (back - front) + vdi.depth_origin
+    through = np.add.reduceat(optical_depth, begins) < _DARK
+    shares = np.where(through, 1.0, (depth - near) / max(far - near, np.finfo(np.float64).tiny))
+    if look is not None:  # lists of which nothing is shown are empty
+        shares = shares[np.add.reduceat(optical_depth, begins) > 0]
+    return float(np.clip(shares, 0.0, 1.0).mean()) if len(shares) else 1.0
+
+
 class PreparedVDI:
     """A VDI on a device, in the form that the raycaster reads; the VDI itself is not kept."""
 
@@ -209,7 +242,7 @@ class PreparedVDI:
         rays.check_list_space(vdi.camera, vdi.bounds)
         #: View depths of the bounds, and the least that is in front of V_O's eye, world units.
         self.depths = near, far = rays.depth_range(vdi.camera, vdi.bounds)
-        self.nearest = rays.nearest_depth(vdi.camera, vdi.bounds) if not self.parallel else -np.inf
+        self.nearest = rays.nearest_depth(vdi.camera, vdi.bounds)
         # An origin much closer than the data costs the coordinate the digits that it is to save
         closest = min(near, self.depth_origin)
         #: Whether the depth coordinate is that of a long lens.
@@ -270,9 +303,8 @@ class PreparedVDI:
                 last = packing.codes(offsets[occupied + 1] - 1)[1]
                 ends = np.stack([packing.depths(occupied, each) for each in (first, last)], axis=1)
             else:
-                made_on: Any = getattr(vdi.late, "on", None)
-                if made_on is not None:
-                    held |= stack.enter_context(made_on(runtime))
+                if hasattr(vdi.late, "on"):
+                    held |= stack.enter_context(vdi.late.on(runtime))
                 if not held:
                     arrays: Any = zip(_ARRAYS.items(), vdi.arrays, strict=True)
                     held = {name: upload(array, what) for (name, what), array in arrays}
@@ -282,32 +314,22 @@ class PreparedVDI:
             if packing is None:
                 self._prepare_lists(held, begins, keep)
             else:
-                self._prepare_packed(held, keep)
+                entries = runtime.result((max(1, self._entries), 2), np.uint32, "supersegments")
+                self.faces = self.media = keep(entries)
+                prepare = runtime.bind(
+                    "raycasting/prepare.cl",
+                    "prepare_packed",
+                    **held,
+                    centre_ray=self._centre,
+                    headers=self.headers,
+                    faces=self.faces,
+                )
+                count = partial(prepare, padded(vdi.counts.size, GROUP), GROUP)
+                self.occupancy = OccupancyGrid(self, count, keep)
         if runtime.is_cpu:
-            self.lit = share_lit(vdi, *self.depths)
+            self.lit = _share_lit(vdi, *self.depths)
 
-    def _prepare_packed(self, held: dict[str, Any], keep: Keep) -> None:
-        """Prepare lists of 8-byte supersegments behind their scales, and count them."""
-        runtime, lists = self.runtime, self.window[0] * self.window[1]
-        self.faces = self.media = keep(
-            runtime.result((max(1, self._entries), 2), np.uint32, "supersegments")
-        )
-        prepare = runtime.bind(
-            "raycasting/prepare.cl",
-            "prepare_packed",
-            **held,
-            centre_ray=self._centre,
-            headers=self.headers,
-            faces=self.faces,
-        )
-        self.occupancy = OccupancyGrid(self, partial(prepare, padded(lists, GROUP), GROUP), keep)
-
-    def _prepare_lists(
-        self,
-        arrays: dict[str, Any],
-        begins: DeviceBuffer,
-        keep: Keep,
-    ) -> None:
+    def _prepare_lists(self, arrays: dict[str, Any], begins: DeviceBuffer, keep: Keep) -> None:
         """Prepare exact lists, and count them in the occupancy grid.
 
         ``begins``: where bundles begin that have all supersegments of ``arrays``.
@@ -321,7 +343,7 @@ class PreparedVDI:
         prepare = runtime.bind(
             "raycasting/prepare.cl",
             "prepare_lists",
-            **{**_NO_MEDIA, **arrays},
+            **{"cells": 0, **_NO_MEDIA, **arrays},
             begins=begins,
             centre_ray=self._centre,
             depth_kind=constants.PARALLEL if self.double_float else self.depth_kind,
@@ -410,9 +432,8 @@ class KeptValues(PreparedVDI):
         arrays = {"means": deferred.mean, "spreads": deferred.spread, "steps": deferred.steps}
         self._lists = made_vdi(deferred.arrays, deferred)
         with kept_together() as keep:
-            #: Means, spreads and steps of the supersegments.
             self.values = {
-                name: keep(runtime.upload(np.ascontiguousarray(array), f"{name} of values"))
+                name: keep(runtime.upload(array, f"{name} of values"))
                 for name, array in arrays.items()
             }
             super().__init__(runtime, self._lists)
@@ -431,7 +452,7 @@ class KeptValues(PreparedVDI):
         """Return what a transfer function shows: what is transparent is left out."""
         runtime, shown = self.runtime, copy.copy(self)
         if runtime.is_cpu:
-            shown.lit = share_lit(self._lists, *self.depths, partial(look.media_of, look))
+            shown.lit = _share_lit(self._lists, *self.depths, look)
         with (
             kept_together() as keep,
             runtime.upload(look.integrals, "integrals of a transfer function") as table,
@@ -449,9 +470,7 @@ class _MadeOnce:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._places: weakref.WeakKeyDictionary[
-            Any, dict[Runtime, tuple[threading.Lock, list[Any]]]
-        ]
+        self._places: weakref.WeakKeyDictionary[Any, dict[Runtime, tuple[Any, list[Any]]]]
         self._places = weakref.WeakKeyDictionary()
 
     def of(self, runtime: Runtime, thing: Any, make: Callable[[], Any]) -> Any:
@@ -476,9 +495,8 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
     """Return the VDI on the device, made once and kept as long as the VDI lives."""
 
     def make() -> PreparedVDI:
-        look = vdi.late
-        if isinstance(look, ValuesLook) and look.deferred.n_supersegments:
-            return kept_values(runtime, look.deferred).shown(look)
+        if isinstance(vdi.late, ValuesLook):
+            return kept_values(runtime, vdi.late.deferred).shown(vdi.late)
         return PreparedVDI(runtime, vdi)
 
     return _prepared.of(runtime, vdi, make)  # type: ignore[no-any-return]
@@ -499,6 +517,5 @@ def release_from_devices(things: Iterable[VDI | DeferredVDI | Volume | None]) ->
             _kept.release(thing)
         elif thing is not None:
             _prepared.release(thing)
-            late: Any = thing.late
-            if hasattr(late, "on"):
-                late.arrays()
+            if hasattr(thing.late, "on"):
+                thing.late.arrays()

@@ -1,17 +1,17 @@
 """VDI to image, on a device."""
 
-from typing import Any
+from contextlib import ExitStack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, get_runtime, padded
 from pyvista_vdi.model.options import FrameRequest
-from pyvista_vdi.model.ray_forms import reference_depth
+from pyvista_vdi.model.ray_forms import pixel_rays
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose
 from pyvista_vdi.raycasting.picking import FirstHit
-from pyvista_vdi.raycasting.prepared import PreparedVDI, prepared_vdi
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.raycasting.scene import Scene
 
 #: Work-items per group that clear an image.
@@ -27,8 +27,10 @@ def render_vdi(vdi: VDI, request: FrameRequest) -> NDArray[np.float32]:
     runtime = get_runtime(request.device)
     prepared = prepared_vdi(runtime, vdi)
     shape, out = (*request.window_size[::-1], 4), request.out
-    with runtime.result(shape, name="image", out=out) as image:
-        draw(prepared, request, image)
+    with ExitStack() as stack:
+        keep = stack.enter_context
+        image = keep(runtime.result(shape, name="image", out=out))
+        enqueue(Scene.of(prepared, request, keep), image)
         return runtime.download(image, out)
 
 
@@ -39,39 +41,29 @@ def render_first_hits(vdi: VDI, request: FrameRequest, hit: FirstHit) -> NDArray
     """
     runtime = get_runtime(request.device)
     prepared = prepared_vdi(runtime, vdi)
-    with runtime.buffer(request.window_size[::-1], name="depth of first hits") as image:
-        draw(prepared, request, image, hit)
+    with ExitStack() as stack:
+        keep = stack.enter_context
+        image = keep(runtime.buffer(request.window_size[::-1], name="depth of first hits"))
+        enqueue(Scene.of(prepared, request, keep, hit), image)
         t = runtime.download(image)
-    return (t + reference_depth(request.camera, vdi.bounds)).astype(np.float32)
+    rays = pixel_rays(request.camera, request.window_size, vdi.bounds)
+    return (t + rays.reference_depth).astype(np.float32)
 
 
-def draw(
-    prepared: PreparedVDI, request: FrameRequest, image: DeviceBuffer, hit: FirstHit | None = None
-) -> None:
-    """Enqueue the drawing of a frame into ``image``, float32 (H, W, 4) on the device.
+def enqueue(scene: Scene, image: DeviceBuffer) -> None:
+    """Enqueue the kernel that draws a scene into ``image``, float32 (H, W, 4) on the device.
 
-    With ``hit``, t of each ray's first hit in its place, float32 (H, W).
-    """
-    scene = Scene.of(prepared, request, hit)
-    # Buffers that are host memory in use are waited for when they are released
-    with scene.on_device() as (forms, ends):
-        enqueue(scene, scene.arguments(forms, ends), image)
-
-
-def enqueue(scene: Scene, arguments: dict[str, Any], image: DeviceBuffer) -> None:
-    """Enqueue the kernel that draws a scene, whose :meth:`Scene.arguments` are given.
-
-    Pixels beside :attr:`Scene.part` are cleared, but not beside :attr:`Scene.only`.
+    Where hits are asked for, t of each ray's first one, float32 (H, W). Pixels beside
+    :attr:`Scene.part` are cleared, but not beside :attr:`Scene.only`.
     """
     runtime = scene.prepared.runtime
-    variant = choose(runtime, scene)
+    variant = choose(scene)
     pixels = scene.size[0] * scene.size[1]
     if not variant.whole and scene.only is None and scene.part.pixels < pixels:
         nothing, numbers = (0.0, 4 * pixels) if scene.hit is None else (np.inf, pixels)
         items = padded(numbers, _CLEARING_GROUP)
         cleared = runtime.bind("raycasting/clear.cl", "clear_image", image=image)
         cleared(items, _CLEARING_GROUP, numbers=numbers, nothing=nothing)
-    launch = runtime.bind(
-        *variant.kernel, variant.switches, **arguments, **variant.arguments, image=image
-    )
+    arguments = {**scene.arguments(), **variant.arguments}
+    launch = runtime.bind(*variant.kernel, variant.switches, **arguments, image=image)
     launch(variant.items, variant.group)

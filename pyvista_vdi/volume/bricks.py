@@ -19,6 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, kept_together
 from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.errors import DeviceMemoryError
+from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.rays import Variant
 
 #: Logarithms to base 2 of the cells along a brick's edge: large ones copy fewer points twice.
@@ -39,36 +40,20 @@ Read = Callable[[NDArray[Any]], NDArray[Any]]
 class Room:
     """Device memory for a volume: the limit, if any, and what else is on the device meanwhile.
 
-    ``working``: bytes of the buffers that the rays need; ``steps``: of all rays, whose samples
-    bricks hold at a time; ``rays``: what they are of, for messages.
+    ``working``: bytes of the buffers that the rays need; ``samples``: those of the samples of all
+    rays that bricks need beside them; ``rays``: what they are of, for messages.
     """
 
     limit: int | None
     working: int
-    steps: int
+    samples: int
     rays: str
-
-    def holds(self, runtime: Runtime, nbytes: int, others: int, *, uploaded: bool) -> bool:
-        """Whether a volume of so many bytes, and others beside, may be on the device as a whole."""
-        info = runtime.info
-        if self.limit is None and uploaded:
-            return True
-        if nbytes > info.max_allocation:
-            return False
-        if self.limit is not None:
-            return nbytes + others + self.working <= self.limit
-        return runtime.allocated + nbytes + others + self.working <= info.global_memory
 
     def in_all(self, runtime: Runtime) -> int:
         """Return the bytes that may be taken, drivers' needs left out."""
         if self.limit is not None:
             return self.limit
         return int(_SHARE_OF_FREE * (runtime.info.global_memory - runtime.allocated))
-
-    @property
-    def sample_bytes(self) -> int:
-        """Bytes of the samples that bricks need beside them."""
-        return self.steps * SAMPLE_BYTES
 
 
 @dataclass(frozen=True)
@@ -142,7 +127,8 @@ class DeviceBricks(AbstractContextManager["DeviceBricks"]):
     read, of ``dtype``; how they are cut, how many ``slots`` there are, and the ``memory_limit``
     that was asked for; and which macrocells are ``visible``: other bricks are never copied.
     ``pool`` has the bricks, ``slots`` where each is whose steps are to be sampled now, int32, -1
-    for the others; ``copied`` counts bricks that were copied to the device so far.
+    for the others; ``wanted`` is for kernels to say which they need; ``copied`` counts bricks that
+    were copied to the device so far.
     """
 
     def __init__(
@@ -172,18 +158,12 @@ class DeviceBricks(AbstractContextManager["DeviceBricks"]):
             pool = runtime.buffer((slots, self._staged.size), dtype, f"bricks of volume {name!r}")
             self.pool = keep(pool)
             self.slots = keep(runtime.buffer((layout.n_bricks,), np.int32, "slots of bricks"))
-            self._wanted = keep(runtime.buffer((layout.n_bricks,), np.uint32, "wanted bricks"))
+            self.wanted = keep(runtime.buffer((layout.n_bricks,), np.uint32, "wanted bricks"))
 
     def __exit__(self, *_: object) -> None:
         self._runtime.finish()
-        for buffer in (self.pool, self.slots, self._wanted):
+        for buffer in (self.pool, self.slots, self.wanted):
             buffer.release()
-
-    def wanted(self, ask: Callable[[DeviceBuffer], None]) -> NDArray[np.intp]:
-        """Return the bricks that ``ask`` sets in the buffer it is given, ascending."""
-        self._runtime.fill(self._wanted, np.uint32(0))
-        ask(self._wanted)
-        return np.flatnonzero(self._runtime.download(self._wanted))
 
     def rounds(self, bricks: NDArray[np.intp]) -> Iterator[None]:
         """Bring bricks to the device, as many at a time as there is room for.
@@ -193,22 +173,19 @@ class DeviceBricks(AbstractContextManager["DeviceBricks"]):
         ordered = sorted(bricks.tolist(), key=lambda brick: brick not in self._slot_of)
         for first in range(0, len(ordered), self._n_slots):
             now = ordered[first : first + self._n_slots]
-            self._hold(now)
+            missing = [brick for brick in now if brick not in self._slot_of]
+            for brick in now:
+                if brick in self._slot_of:
+                    self._slot_of.move_to_end(brick)
+            for brick in missing:
+                self._runtime.give_way()
+                slot = self._free.pop() if self._free else self._slot_of.popitem(last=False)[1]
+                self._copy(brick, slot)
+                self._slot_of[brick] = slot
             slots = np.full(self.layout.n_bricks, -1, np.int32)
             slots[now] = [self._slot_of[brick] for brick in now]
             self._runtime.write(self.slots, slots)
             yield
-
-    def _hold(self, bricks: Sequence[int]) -> None:
-        missing = [brick for brick in bricks if brick not in self._slot_of]
-        for brick in bricks:
-            if brick in self._slot_of:
-                self._slot_of.move_to_end(brick)
-        for brick in missing:
-            self._runtime.give_way()
-            slot = self._free.pop() if self._free else self._slot_of.popitem(last=False)[1]
-            self._copy(brick, slot)
-            self._slot_of[brick] = slot
 
     def _copy(self, brick: int, slot: int) -> None:
         grid, own = self.layout.region(brick)
@@ -255,11 +232,10 @@ class StepSampler(AbstractContextManager["StepSampler"]):
 
     def sample(self, view: dict[str, Any]) -> None:
         """Sample steps of rays, as their numbers (``RaysOfView``) say."""
-        items = block_items(view["columns"], view["rows"])
-        wanted = self._bricks.wanted(
-            lambda table: self._launch(items, GROUP, view=view, wanted=table)
-        )
-        for _ in self._bricks.rounds(wanted):
+        items, wanted = block_items(view["columns"], view["rows"]), self._bricks.wanted
+        self._runtime.fill(wanted, np.uint32(0))
+        self._launch(items, GROUP, view=view, wanted=wanted)
+        for _ in self._bricks.rounds(np.flatnonzero(self._runtime.download(wanted))):
             self._launch(items, GROUP, view=view, wanted=None)
 
 
@@ -293,12 +269,14 @@ def in_parts(
         )
 
 
-def too_small(what: str, room: Room, runtime: Runtime, whole: int, brick: int) -> DeviceMemoryError:
+def too_small(
+    volume: Volume, room: Room, runtime: Runtime, whole: int, brick: int
+) -> DeviceMemoryError:
     """Return the error for a volume of which not even one brick has room.
 
     ``whole``, ``brick``: bytes of the volume, and of one brick, each with what it needs beside.
     """
-    info = runtime.info
+    info, (nx, ny, nz) = runtime.info, volume.dimensions
     given = (
         f"{info.full_name!r} has {bytes_text(info.global_memory)}, of which this process holds "
         f"{bytes_text(runtime.allocated)}, and allows {bytes_text(info.max_allocation)} per buffer"
@@ -306,8 +284,9 @@ def too_small(what: str, room: Room, runtime: Runtime, whole: int, brick: int) -
         else f"memory_limit is {bytes_text(room.limit)}"
     )
     return DeviceMemoryError(
-        f"{what} takes {bytes_text(whole + room.working)} in one piece and at least "
-        f"{bytes_text(brick + room.working + room.sample_bytes)} brick by brick, "
+        f"the volume {volume.name!r}, {nx} x {ny} x {nz} of {volume.array.dtype} takes "
+        f"{bytes_text(whole + room.working)} in one piece and at least "
+        f"{bytes_text(brick + room.working + room.samples)} brick by brick, "
         f"{room.rays} included; {given}: raise memory_limit, or use a smaller window size or "
         "max_supersegments, or another device"
     )

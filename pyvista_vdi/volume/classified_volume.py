@@ -1,8 +1,8 @@
 """A volume and its classification on a device, shared by generation and direct volume rendering."""
 
-import contextlib
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,6 @@ from pyvista_vdi.volume.upload import (
     TABLE_BYTES,
     HeldVoxels,
     Scale,
-    described,
     device_bytes,
     gradient_table,
     held_voxels,
@@ -39,8 +38,8 @@ from pyvista_vdi.volume.upload import (
     lighting_table,
     macrocells_over,
     other_bytes,
+    scaled,
     uploads_of,
-    voxel_reader,
 )
 
 #: Macrocells: farther than this no march looks for what is not transparent.
@@ -65,10 +64,8 @@ class DeviceVolume:
     ``rays`` are marched through ``grid``, the volume or what it is a part of, by ``most_steps``,
     those of the longest. ``bricks`` are on the device where the whole volume is not: steps must be
     sampled by a :class:`~pyvista_vdi.volume.bricks.StepSampler` before kernels march along them.
-    Kernels are compiled for ``variant``, but for what belongs to a view. ``zero`` is the scalar of
-    a voxel that is 0 on the device, ``unit`` scalars per unit of the device's voxels.
-    InvalidArgumentError if the sample distance is no positive length, DeviceMemoryError if
-    something does not fit.
+    Kernels are compiled for ``variant``, but for what belongs to a view. InvalidArgumentError if
+    the sample distance is no positive length, DeviceMemoryError if something does not fit.
     """
 
     def __init__(
@@ -107,17 +104,15 @@ class DeviceVolume:
         # The voxels, the transfer function over them, and what it makes transparent
         voxels = held_voxels(runtime, volume, transfer_function, room)
         scale = voxels.scale
-        self.zero, self.unit = (0.0, 1.0) if scale is None else (scale.low, scale.unit)
-        classes = _Classes.of(runtime, volume, voxels, transfer_function)
-        table, self._visible = classes.table, classes.visible
-        distances = classes.distances if skip_empty else None
+        table, self._visible, distances = _classified(runtime, volume, voxels, transfer_function)
         nearest = transfer_function.interpolation == "nearest"
 
         # What samples are shaded by
         scalars = volume.finite_range if part is None else lambda: part.scalar_range
         gradient = None
         if transfer_function.gradient_opacities is not None:
-            values = gradient_table(volume.spacing, scalars(), transfer_function, self.unit)
+            unit = 1.0 if scale is None else scale.unit
+            values = gradient_table(volume.spacing, scalars(), transfer_function, unit)
             gradient = runtime.upload(values, "gradient opacity")
         shading = transfer_function.shading
         self.variant: Variant = replace(
@@ -134,13 +129,13 @@ class DeviceVolume:
             kept = uploads_of(volume).kept
             blanked = kept(runtime, "blanked", None, lambda: runtime.upload(octants, name))
         asked = options.ambient_occlusion
-        occlusion = None if asked is None else OcclusionGrid.of(self.grid, asked)
+        occlusion = None if asked is None else OcclusionGrid(self.grid, asked)
         strength = 0.0 if asked is None else asked.strength
         self._arguments: dict[str, Any] = {
             "classified": _numbers(volume, table, part, occlusion, strength),
             "voxels": voxels.buffer,
             "table": table.buffer,
-            "distances": distances,
+            "distances": distances if skip_empty else None,
             "blanked": blanked,
             "gradient": gradient,
             "lighting": None,
@@ -163,10 +158,6 @@ class DeviceVolume:
                 runtime, volume, room, scale, transfer_function, self._visible
             )
             self._arguments["voxels"] = self.bricks.pool
-
-    def giving_bricks_back(self) -> contextlib.AbstractContextManager[object]:
-        """Return a context at whose end what bricks take is released."""
-        return contextlib.nullcontext() if self.bricks is None else self.bricks
 
     def medium_arguments(self, camera: Camera) -> dict[str, Any]:
         """Return the arguments ``MEDIUM_PARAMETERS`` (``volume/medium.cl``) of kernels that march.
@@ -191,10 +182,7 @@ class DeviceVolume:
         medium = {**{name: self._arguments[name] for name in names}, "visible": self._visible}
         variant = replace(self.variant, shaded=0, compensated=0, sharp=False)
         lengths = self.sample_distance, self.unit_distance
-
-        def make() -> DeviceBuffer:
-            return ambient_transmittances(self.runtime, grid, medium, variant, lengths)
-
+        make = partial(ambient_transmittances, self.runtime, grid, medium, variant, lengths)
         return uploads_of(self.volume).kept(self.runtime, "occlusion", key, make)
 
 
@@ -209,42 +197,30 @@ class _Table:
     by_scalar: bool = False  # whether it has the media
 
 
-@dataclass(frozen=True)
-class _Classes:
-    """What a transfer function makes of a volume: its table, and which macrocells are visible.
+def _classified(
+    runtime: Runtime, volume: Volume, voxels: HeldVoxels, transfer_function: TransferFunction
+) -> tuple[_Table, DeviceBuffer, DeviceBuffer | None]:
+    """Return what a transfer function makes of a volume, made once for its last classification.
 
-    ``distances``: of the macrocells from visible ones; None where too few are transparent.
+    Its table, which macrocells are visible, and how far each is from a visible one; None where too
+    few are transparent.
     """
 
-    table: _Table
-    visible: DeviceBuffer
-    distances: DeviceBuffer | None
+    def make() -> tuple[_Table, DeviceBuffer, DeviceBuffer | None]:
+        table = _table(runtime, transfer_function, native=voxels.scale is None)
+        visible = _visibility(runtime, volume, voxels, table, transfer_function)
+        distances = _distances(runtime, volume, voxels, visible)
+        ends = None
+        if voxels.scale is None and transfer_function.interpolation == "nearest":
+            ends = integer_ends(runtime, volume, voxels.ranges)
+        if ends is not None:
+            table = _media_of_scalars(runtime, table, *ends)
+        return table, visible, distances
 
-    @classmethod
-    def of(
-        cls,
-        runtime: Runtime,
-        volume: Volume,
-        voxels: HeldVoxels,
-        transfer_function: TransferFunction,
-    ) -> "_Classes":
-        """Return them, made once for a volume's last classification on a device."""
-
-        def make() -> "_Classes":
-            table = _table(runtime, transfer_function, native=voxels.scale is None)
-            visible = _visibility(runtime, volume, voxels, table, transfer_function)
-            distances = _distances(runtime, volume, voxels, visible)
-            ends = None
-            if voxels.scale is None and transfer_function.interpolation == "nearest":
-                ends = integer_ends(runtime, volume, voxels.ranges)
-            if ends is not None:
-                table = _media_of_scalars(runtime, table, *ends)
-            return cls(table, visible, distances)
-
-        if voxels.buffer is None:  # the memory is for bricks
-            return make()
-        key = (transfer_function, voxels.scale)
-        return uploads_of(volume).kept(runtime, "classification", key, make)
+    if voxels.buffer is None:  # the memory is for bricks
+        return make()
+    key = (transfer_function, voxels.scale)
+    return uploads_of(volume).kept(runtime, "classification", key, make)
 
 
 def _table(runtime: Runtime, transfer_function: TransferFunction, *, native: bool) -> _Table:
@@ -372,14 +348,14 @@ def _bricks_within(
     dtype = volume.array.dtype if scale is None else np.dtype(np.float32)
     point_bytes = dtype.itemsize * math.prod(volume.array.shape[3:])
     others = other_bytes(volume)
-    left = room.in_all(runtime) - room.working - room.sample_bytes - others
+    left = room.in_all(runtime) - room.working - room.samples - others
     largest = runtime.info.max_allocation
     found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
     if found is None:
         least = BrickLayout.of(volume.dimensions, SHIFTS[-1], gradients, point_bytes)
         brick, whole = least.brick_bytes + least.table_bytes, device_bytes(volume, scale)
-        raise too_small(described(volume), room, runtime, whole + others, brick + others)
-    read = voxel_reader(scale)
+        raise too_small(volume, room, runtime, whole + others, brick + others)
+    read = partial(scaled, scale=scale)
     return DeviceBricks(
         runtime, volume.array, read, dtype, *found, room.limit, visible, volume.name
     )

@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import Runtime
 from pyvista_vdi.device.constants import BLOCK_RAYS, GROUP
@@ -17,7 +16,7 @@ from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.float32_limits import ENTRY_PER_POINT, FAR_ENTRY, MOST_STEPS, NEAR_ENTRY
 from pyvista_vdi.model.options import Planes
-from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle, packed
+from pyvista_vdi.model.ray_forms import Floats, PixelRays, Rectangle
 from pyvista_vdi.model.volume import Grid
 
 Ends = tuple[float, float, float]
@@ -57,10 +56,6 @@ class MarchForms:
     planes: int
     double_float: bool
 
-    def packed(self, *more: Floats) -> NDArray[np.float32]:
-        """Return the forms, and more of the same rays, as the kernels read them."""
-        return packed([*self.forms, *more])
-
 
 @dataclass(frozen=True)
 class GridRays:
@@ -76,20 +71,16 @@ class GridRays:
         """Return what the kernels march along in a view."""
         pixel_rays = rays.pixel_rays(camera, window_size, self.grid.bounds)
         to_index, points = rays.inverse_affine(self.grid.index_to_model), self.grid.dimensions
-        index = [pixel_rays.form(row[:3], row[3]) for row in to_index[:3]]
-        direction = [pixel_rays.form(axis) for axis in np.eye(3)]
-        planes = []
-        for form, n in zip(index, points, strict=True):
-            far = -form
-            far[0] += n - 1
-            planes += [form, far]
-        planes += rays.view_planes(camera, pixel_rays, clipping_planes)
-        reach = rays.largest_value(camera, window_size, self.grid.bounds, index)
+        index, direction = pixel_rays.forms(to_index[:3]), pixel_rays.forms(np.eye(3, 4))
+        far = -index
+        far[:, 0] += np.subtract(points, 1)
+        planes = [*index, *far, *rays.view_planes(camera, pixel_rays, clipping_planes)]
+        reach = rays.largest_value(pixel_rays, camera, window_size, self.grid.bounds, index)
         two_floats = reach > min(max(NEAR_ENTRY, ENTRY_PER_POINT * max(points)), FAR_ENTRY)
         return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), two_floats)
 
     def view(
-        self, size: Sequence[int], planes: int, window: Rectangle | None = None, **changes: int
+        self, size: Sequence[int], planes: int, window: Rectangle | None = None
     ) -> dict[str, Any]:
         """Return the numbers of rays (``RaysOfView``) through part of a window, or all of it."""
         width, height = size
@@ -102,7 +93,6 @@ class GridRays:
             "first_step": 0,
             "steps": ALL_STEPS,
             **part,
-            **changes,
             "sample_distance": self.sample_distance,
             "unit_distance": self.unit_distance,
         }

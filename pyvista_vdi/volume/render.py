@@ -3,12 +3,11 @@
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime, get_runtime
+from pyvista_vdi.device import get_runtime
 from pyvista_vdi.device.constants import block_items
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
@@ -27,31 +26,6 @@ _STATE_BYTES = 32
 _PART_BYTES, _PARTS_IN_LIMIT = 32 * 2**20, 8
 #: Bytes of the image, and of the depth at which a ray ends, for each pixel.
 _PIXEL_BYTES = 16 + 4
-
-
-class ClippedRays:
-    """A view's rays through a volume, clipped and cropped as a request says.
-
-    ``forms``: as ``begin_march`` takes them, the planes of cropping behind; ``planes``: how many of
-    them clip; ``ends``: where opaque geometry ends the rays; ``regions``: what cropping keeps;
-    ``variant``: what kernels that march along them are compiled for.
-    """
-
-    def __init__(self, medium: DeviceVolume, request: FrameRequest) -> None:
-        options = request.options
-        march = medium.rays.forms(request.camera, request.window_size, options.clipping_planes)
-        self.ends = rays.checked_opaque_depth(request.opaque_depth, request.window_size, march.rays)
-        cut, beyond, self.regions = rays.cropped(march.rays, options.cropping, medium.volume.bounds)
-        self.planes, self.forms = march.planes + len(cut), march.packed(*cut, *beyond)
-        self.variant = replace(medium.variant, double_float=march.double_float)
-
-    def uploaded(
-        self, runtime: Runtime, stack: ExitStack
-    ) -> tuple[DeviceBuffer, DeviceBuffer | None]:
-        """Return forms and ends on a device, as long as the stack is open."""
-        upload = partial(runtime.upload, brief=True)
-        opaque: Any = nullcontext() if self.ends is None else upload(self.ends, "opaque depth")
-        return stack.enter_context(upload(self.forms, "rays")), stack.enter_context(opaque)
 
 
 def raycast_volume(
@@ -75,7 +49,7 @@ def raycast_volume(
         skip_empty=request.options.skip_empty,
         room=room,
     )
-    with medium.giving_bricks_back():
+    with medium.bricks or nullcontext():
         return raycast_medium(medium, request)
 
 
@@ -85,7 +59,7 @@ def picture_room(size: tuple[int, int], memory_limit: int | None, occlusion: int
     items = block_items(width, _rows_of_part(size, memory_limit))
     working = width * height * _PIXEL_BYTES + items * _STATE_BYTES + occlusion
     rays = f"an image of {width} x {height} pixels"
-    return Room(memory_limit, working, items * _PART_STEPS, rays)
+    return Room(memory_limit, working, items * _PART_STEPS * SAMPLE_BYTES, rays)
 
 
 def _rows_of_part(size: tuple[int, int], memory_limit: int | None) -> int:
@@ -108,30 +82,35 @@ def raycast_medium(
     """
     runtime, camera, options = medium.runtime, request.camera, request.options
     width, height = size = request.window_size
-    clipped = ClippedRays(medium, request)
-    bricks = medium.bricks
+    bricks, upload = medium.bricks, partial(runtime.upload, brief=True)
+    march = medium.rays.forms(camera, size, options.clipping_planes)
+    variant = replace(medium.variant, double_float=march.double_float)
+    opaque = rays.checked_opaque_depth(request.opaque_depth, size, march.rays)
+    cut, beyond, regions = rays.cropped(march.rays, options.cropping, medium.volume.bounds)
+    planes = march.planes + len(cut)
     with ExitStack() as stack:
         keep = stack.enter_context
         image = keep(runtime.result((height, width, 4), name="image"))
-        forms, ends = clipped.uploaded(runtime, stack)
+        forms = keep(upload(rays.packed([*march.forms, *cut, *beyond]), "rays"))
+        ends = None if opaque is None else keep(upload(opaque, "opaque depth"))
         medium_arguments = medium.medium_arguments(lit_from or camera)
         draw = partial(
             RayLaunch,
             runtime,
             "volume/render_volume.cl",
             "render_volume",
-            clipped.variant.defines,
-            one_by_one=clipped.variant.one_by_one or bricks is not None,
+            variant.defines,
+            one_by_one=variant.one_by_one or bricks is not None,
             **medium_arguments,
             forms=forms,
             opaque_depth=ends,
             transmittance_cutoff=options.transmittance_cutoff or -1.0,
             opacity_multiplier=options.opacity_multiplier,
-            regions=clipped.regions,
+            regions=regions,
             image=image,
         )
+        view = medium.rays.view(size, planes)
         if bricks is None:
-            view = medium.rays.view(size, clipped.planes)
             draw(samples=None, states=None)(block_items(width, height), view=view)
             return runtime.download(image)
         # Some steps of some rows at a time; the state of the rays goes on from step to step
@@ -139,16 +118,13 @@ def raycast_medium(
         items = block_items(width, rows)
         states = keep(runtime.buffer((items, 2, 4), name="states of rays"))
         room = items * _PART_STEPS
-        sampler = keep(
-            StepSampler(runtime, bricks, medium_arguments, clipped.variant, forms, room, ends)
-        )
+        sampler = keep(StepSampler(runtime, bricks, medium_arguments, variant, forms, room, ends))
         launch = draw(samples=sampler.samples, states=states)
         for first_row in range(0, height, rows):
             now = min(rows, height - first_row)
             for first_step in range(0, medium.most_steps, _PART_STEPS):
-                part = {"first_row": first_row, "rows": now}
-                part |= {"first_step": first_step, "steps": _PART_STEPS}
-                view = medium.rays.view(size, clipped.planes, None, **part)
+                view |= {"first_row": first_row, "rows": now}
+                view |= {"first_step": first_step, "steps": _PART_STEPS}
                 sampler.sample(view)
                 launch(block_items(width, now), view=view)
         return runtime.download(image)

@@ -54,15 +54,6 @@ _uploads: weakref.WeakKeyDictionary[Volume, _Uploads] = weakref.WeakKeyDictionar
 _uploads_lock = threading.Lock()
 
 
-def voxel_variant(volume: Volume, native: bool) -> Variant:
-    """Return how kernels find and read a voxel."""
-    return Variant(
-        voxel=_DEVICE_TYPES[volume.array.dtype.name] if native else "float",
-        index="ulong" if volume.array.size >= 2**32 else "uint",
-        components=4 if volume.rgba else 1,
-    )
-
-
 @dataclass(frozen=True)
 class HeldVoxels:
     """A volume's voxels on a device, where there is room for all, and how kernels read them.
@@ -81,39 +72,33 @@ def held_voxels(
     runtime: Runtime, volume: Volume, transfer_function: TransferFunction, room: Room | None
 ) -> HeldVoxels:
     """Upload a volume for a transfer function, or what is known of it where it does not fit."""
-    suits = _suits_natively(volume, transfer_function)
-    native = suits and (volume.array.dtype.kind != "f" or not _too_large(runtime, volume, room))
-    scale = None if native else scale_of(volume, *transfer_function.scalar_range)
-    variant = voxel_variant(volume, native)
+    dtype, uploads = volume.array.dtype, uploads_of(volume)
+    native = dtype.name in _DEVICE_TYPES
+    if native and not volume.rgba:  # a byte is exact, and colours have no such range
+        low, high = transfer_function.scalar_range
+        native = scalars_suit_float32(low, high, dtype, transfer_function.interpolation)
+    variant = Variant(
+        voxel=_DEVICE_TYPES[dtype.name] if native else "float",
+        index="ulong" if volume.array.size >= 2**32 else "uint",
+        components=4 if volume.rgba else 1,
+    )
+    scale = None
+    if not native or uploads.too_large:
+        scale = scale_of(volume, *transfer_function.scalar_range)
     if room is None or fits_whole(runtime, volume, scale, room):
-        return HeldVoxels(*upload_voxels(runtime, volume, scale, variant), scale, variant)
-    ranges = upload_ranges(runtime, volume, scale, variant, room)
-    return HeldVoxels(None, ranges, scale, variant)
-
-
-def _suits_natively(volume: Volume, transfer_function: TransferFunction) -> bool:
-    """Whether type and range let kernels read the voxels as they are."""
-    dtype = volume.array.dtype
-    if dtype.name not in _DEVICE_TYPES:
-        return False
-    if volume.rgba:  # a byte is exact, and colours have no such range
-        return True
-    low, high = transfer_function.scalar_range
-    return scalars_suit_float32(low, high, dtype, transfer_function.interpolation)
-
-
-def _too_large(runtime: Runtime, volume: Volume, room: Room | None) -> bool:
-    """Whether differences of a float32 volume's finite voxels may overflow; found once."""
-    uploads = uploads_of(volume)
-    if uploads.too_large is None:
-        variant = voxel_variant(volume, True)
-        if room is None or fits_whole(runtime, volume, None, room):
-            ends = runtime.download(upload_voxels(runtime, volume, None, variant)[1])
-        else:
-            ends = _ranges_in_parts(runtime, volume, None, variant, room)
+        held = HeldVoxels(*upload_voxels(runtime, volume, scale, variant), scale, variant)
+    else:
+        ranges = upload_ranges(runtime, volume, scale, variant, room)
+        held = HeldVoxels(None, ranges, scale, variant)
+    # Look once whether differences of finite float32 voxels may overflow: such are scaled as well
+    if scale is None and dtype.kind == "f" and uploads.too_large is None:
+        ends = runtime.download(held.ranges)
         largest = np.abs(ends).max(initial=0.0, where=np.isfinite(ends))
         uploads.too_large = bool(largest > LARGEST_VOXEL)
-    return uploads.too_large
+        if uploads.too_large:
+            del held  # its memory goes first
+            return held_voxels(runtime, volume, transfer_function, room)
+    return held
 
 
 def uploads_of(volume: Volume) -> _Uploads:
@@ -130,32 +115,26 @@ def release_voxels(volume: Volume) -> None:
 
 
 class _Uploads:
-    """What is on devices of one volume; its lock lets the thread that uploads it be the only one.
-
-    Voxels and the scalar range of each macrocell, by device and scaling; and what :meth:`kept`
-    keeps by device.
-    """
+    """What is on devices of one volume; the thread that uploads it holds its lock."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
-        self.made: dict[Any, tuple[DeviceBuffer, DeviceBuffer]] = {}
+        #: What :meth:`kept` keeps, by device and what it is: the key that it was made for, and it.
+        self.made: dict[tuple[Runtime, str], tuple[Any, Any]] = {}
         #: Scalar range of each macrocell of a volume that no device holds in one piece, by scaling.
         self.ranges: dict[Any, NDArray[np.float32]] = {}
-        #: Whether float32 cannot hold the voxels' differences; None before anyone has asked.
+        #: Whether float32 cannot hold float32 voxels' differences; None before anyone has looked.
         self.too_large: bool | None = None
-        #: The least and the largest voxel of 16 bits; None before anyone has asked.
-        self.ends: tuple[int, int] | None = None
-        self._kept: dict[tuple[Runtime, str], tuple[Any, Any]] = {}
 
     def kept(self, runtime: Runtime, what: str, key: Any, make: Callable[[], T]) -> T:
         """Return what was made last, or make it if that was of another ``key``."""
         with runtime.holding(self.lock):
-            kept = self._kept.get((runtime, what))
-            if kept is None or kept[0] != key:
-                self._kept.pop((runtime, what), None)  # its memory goes first
-                kept = None
-                self._kept[runtime, what] = kept = key, make()
-            return kept[1]  # type: ignore[no-any-return]
+            made = self.made.get((runtime, what))
+            if made is None or made[0] != key:
+                self.made.pop((runtime, what), None)  # its memory goes first
+                made = None
+                self.made[runtime, what] = made = key, make()
+            return made[1]  # type: ignore[no-any-return]
 
 
 def macrocells_over(dimensions: Sequence[int]) -> tuple[int, int, int]:
@@ -175,21 +154,18 @@ def other_bytes(volume: Volume) -> int:
     return math.prod(macrocells_over(volume.dimensions)) * MACROCELL_BYTES + TABLE_BYTES + blanked
 
 
-def described(volume: Volume) -> str:
-    """Return a volume in words, for errors."""
-    nx, ny, nz = volume.dimensions
-    return f"the volume {volume.name!r}, {nx} x {ny} x {nz} of {volume.array.dtype}"
-
-
 def fits_whole(runtime: Runtime, volume: Volume, scale: Scale | None, room: Room) -> bool:
-    """Whether there is room for a volume in one piece."""
-    uploaded = (runtime, scale) in uploads_of(volume).made
-    return room.holds(runtime, device_bytes(volume, scale), other_bytes(volume), uploaded=uploaded)
-
-
-def voxel_reader(scale: Scale | None) -> Callable[[NDArray[Any]], NDArray[Any]]:
-    """Return what makes of voxels what the kernels read."""
-    return (lambda part: part) if scale is None else (lambda part: _scaled(part, scale))
+    """Return whether there is room for a volume in one piece."""
+    info, nbytes = runtime.info, device_bytes(volume, scale)
+    made = uploads_of(volume).made.get((runtime, "voxels"))
+    if room.limit is None and made is not None and made[0] == scale:
+        return True
+    if nbytes > info.max_allocation:
+        return False
+    nbytes += other_bytes(volume) + room.working
+    if room.limit is not None:
+        return nbytes <= room.limit
+    return runtime.allocated + nbytes <= info.global_memory
 
 
 def upload_voxels(
@@ -198,26 +174,22 @@ def upload_voxels(
     scale: Scale | None,
     variant: Variant,
 ) -> tuple[DeviceBuffer, DeviceBuffer]:
-    """Return voxels and the scalar range of each macrocell, made once per device and scaling."""
-    uploads = uploads_of(volume)
-    with runtime.holding(uploads.lock):
-        made = uploads.made
-        for other in [key for key in made if key[0] is runtime and key[1] != scale]:
-            del made[other]  # one copy per device: the last classification's
-        key = (runtime, scale)
-        if key not in made:
-            _require_a_number(runtime, volume)
-            array = volume.array
-            if scale is not None:
-                array = aligned_empty(volume.array.shape, np.float32)
-                for plane, target in zip(volume.array, array, strict=True):
-                    runtime.give_way()
-                    target[...] = _scaled(plane, scale)
-            with kept_together() as keep:
-                voxels = keep(runtime.upload(array, f"volume {volume.name!r}"))
-                ranges = keep(_macrocell_ranges(runtime, volume.dimensions, voxels, variant))
-            made[key] = (voxels, ranges)
-        return made[key]
+    """Return voxels and the scalar range of each macrocell, made for a device's last scaling."""
+
+    def make() -> tuple[DeviceBuffer, DeviceBuffer]:
+        _require_a_number(runtime, volume)
+        array = volume.array
+        if scale is not None:
+            array = aligned_empty(volume.array.shape, np.float32)
+            for plane, target in zip(volume.array, array, strict=True):
+                runtime.give_way()
+                target[...] = scaled(plane, scale)
+        with kept_together() as keep:
+            voxels = keep(runtime.upload(array, f"volume {volume.name!r}"))
+            ranges = keep(_macrocell_ranges(runtime, volume.dimensions, voxels, variant))
+        return voxels, ranges
+
+    return uploads_of(volume).kept(runtime, "voxels", scale, make)
 
 
 def upload_ranges(
@@ -230,8 +202,7 @@ def upload_ranges(
     """Return the scalar range of each macrocell of a volume that a device holds in bricks."""
     uploads = uploads_of(volume)
     with runtime.holding(uploads.lock):
-        for other in [key for key in uploads.made if key[0] is runtime]:
-            del uploads.made[other]  # its memory goes to the bricks
+        uploads.made.pop((runtime, "voxels"), None)  # its memory goes to the bricks
         if scale not in uploads.ranges:
             _require_a_number(runtime, volume)
             uploads.ranges = {scale: _ranges_in_parts(runtime, volume, scale, variant, room)}
@@ -246,13 +217,13 @@ def _ranges_in_parts(
     room: Room,
 ) -> NDArray[np.float32]:
     """Return the scalar range of each macrocell, float32 (n, 2), from parts of the volume."""
-    macrocells, read = macrocells_over(volume.dimensions), voxel_reader(scale)
+    macrocells = macrocells_over(volume.dimensions)
     ranges = aligned_empty((*reversed(macrocells), 2), np.float32)
     point_bytes = device_bytes(volume, scale) // math.prod(volume.dimensions)
     nbytes = min(_PART_BYTES, room.in_all(runtime) // _PARTS, runtime.info.max_allocation)
     for place, points in in_parts(macrocells, 2**MACROCELL_SHIFT, point_bytes, nbytes):
         runtime.give_way()
-        part = np.ascontiguousarray(read(volume.array[points]))
+        part = np.ascontiguousarray(scaled(volume.array[points], scale))
         nz, ny, nx = part.shape[:3]
         with (
             runtime.upload(part, f"part of volume {volume.name!r}") as voxels,
@@ -286,12 +257,9 @@ def integer_ends(runtime: Runtime, volume: Volume, ranges: DeviceBuffer) -> tupl
         return None
     if dtype.itemsize == 1:
         return (0, 255) if dtype.kind == "u" else (-128, 127)
-    uploads = uploads_of(volume)
-    if uploads.ends is None:
-        macrocells = runtime.download(ranges)
-        uploads.ends = int(macrocells[:, 0].min()), int(macrocells[:, 1].max())
-    least, largest = uploads.ends
-    return uploads.ends if largest - least < _MOST_LOOKED_UP else None
+    macrocells = runtime.download(ranges)
+    least, largest = int(macrocells[:, 0].min()), int(macrocells[:, 1].max())
+    return (least, largest) if largest - least < _MOST_LOOKED_UP else None
 
 
 def _require_a_number(runtime: Runtime, volume: Volume) -> None:
@@ -328,19 +296,22 @@ def scale_of(volume: Volume, low: float, high: float) -> Scale:
     return Scale(low, 2 * farthest or 1.0, True)
 
 
-def _scaled(array: NDArray[Any], scale: Scale) -> NDArray[np.float32]:
-    """32-bit integers and float64 to float32, taken relative to the transfer function's range.
+def scaled(array: NDArray[Any], scale: Scale | None) -> NDArray[Any]:
+    """Return voxels as the kernels read them: as they are, or scaled.
 
+    That is 32-bit integers and float64 to float32, relative to the transfer function's range.
     float32 holds 24 bits: of a value far from zero compared with the range little would be left,
     of its place in the range everything that the table can tell apart is.
     """
-    scaled = (array.astype(np.float64) - scale.low) / scale.unit
+    if scale is None:
+        return array
+    place = (array.astype(np.float64) - scale.low) / scale.unit
     if scale.step:  # what is above stays above, however little
-        scaled = np.where(scaled > 0, np.maximum(scaled, _ABOVE), scaled)
+        place = np.where(place > 0, np.maximum(place, _ABOVE), place)
     # Beyond any table anyway: their differences and the squares of these stay finite. An infinite
     # voxel stays one
-    finite = np.clip(scaled, -_BEYOND, _BEYOND)
-    return np.where(np.isinf(array), scaled, finite).astype(np.float32)
+    finite = np.clip(place, -_BEYOND, _BEYOND)
+    return np.where(np.isinf(array), place, finite).astype(np.float32)
 
 
 #: In place of a specular power of 0, as of which a highlight is where the ray is mirrored to the
@@ -384,14 +355,13 @@ def lighting_table(
 
 
 def _light(light: Light, camera: Camera) -> list[float]:
-    position, direction = light.in_world(camera)
-    to_view = camera.view_matrix
+    position, direction = light.in_view(camera)
     cone = math.cos(math.radians(light.cone_angle)) if light.cone_angle <= 90 else _NO_CONE
     return [
         *(light.intensity * c for c in (*light.ambient, *light.diffuse, *light.specular)),
-        *(to_view[:3, :3] @ direction),
+        *direction,
         float(light.positional),
-        *(to_view[:3, :3] @ position + to_view[:3, 3]),
+        *position,
         *light.attenuation,
         cone,
         light.exponent,

@@ -39,7 +39,7 @@ def slab_vdi(optical_depth=0.1, window=WINDOW, precision="exact"):
 
 def scene_of(runtime, vdi, camera, size=SIZE, first_hit=None, prepared=None, **options):
     request = frame(vdi, camera, size, **{"skip_empty": False, **options})
-    return Scene.of(prepared or prepared_vdi(runtime, vdi), request, first_hit)
+    return Scene.of(prepared or prepared_vdi(runtime, vdi), request, lambda kept: kept, first_hit)
 
 
 @pytest.fixture
@@ -60,13 +60,6 @@ def drawn(runtime, prepared, camera, size, unwritten=np.nan):
 OWN, TURNED = "raycast_aligned_view 16", CAMERA.replace(view_up=(0, -1, 0))
 BLOCKS, PACKETS = "raycast 16", "raycast_packets 16"
 REGIONS = {"cropping": ((-0.5, 0.5, -0.5, 0.5, -0.5, 0.5), "fence")}
-
-
-def drawn_by(runtime, scene):
-    """Which kernel draws a scene, and how many rays a work-item of it follows."""
-    variant = choose(runtime, scene)
-    assert len(variant.switches) <= 8
-    return f"{variant.kernel[1]} {variant.rays}"
 
 
 @pytest.mark.parametrize(
@@ -91,8 +84,9 @@ def drawn_by(runtime, scene):
 def test_which_kernel_follows_rays(cpu, camera, size, options, kernel):
     """Blocks near V_O, packets far from it."""
     for precision in ("exact", "8-byte"):
-        scene = scene_of(cpu, slab_vdi(precision=precision), camera, size, **options)
-        assert drawn_by(cpu, scene) == kernel
+        chosen = choose(scene_of(cpu, slab_vdi(precision=precision), camera, size, **options))
+        assert f"{chosen.kernel[1]} {chosen.rays}" == kernel  # and the rays of a work-item
+        assert len(chosen.switches) <= 8
 
 
 @pytest.mark.parametrize("kind", ["near", "around", "inside", "axis"])
@@ -103,7 +97,7 @@ def test_each_pixel_is_drawn_by_one_packet(cpu, kind, monkeypatch):
 
     def written(prepared, camera, numbers):
         """Where packets of some numbers draw."""
-        chosen = choose(cpu, scene_of(cpu, None, camera, size, prepared=prepared))
+        chosen = choose(scene_of(cpu, None, camera, size, prepared=prepared))
         first, strips, number, _ = chosen.arguments["part"]
 
         def some(self, items, group, **arguments):

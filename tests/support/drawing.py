@@ -16,6 +16,7 @@ from pyvista_vdi.model.options import (
 )
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting import multi_vdi, raycast
+from pyvista_vdi.raycasting.scene import Scene
 from pyvista_vdi.volume import render
 
 #: What frames take beside options.
@@ -73,7 +74,8 @@ def render_vdi(vdi, camera, size=None, **options):
 
 def draw(prepared, camera, size, image, *, first_hit=None, **options):
     """Draw a frame of a prepared VDI into an image on the device."""
-    raycast.draw(prepared, frame(None, camera, size, **options), image, first_hit)
+    request = frame(None, camera, size, **options)
+    raycast.enqueue(Scene.of(prepared, request, lambda kept: kept, first_hit), image)
 
 
 def render_vdis(vdis, camera, size, *, opaque_depth=None, device=None, **options):

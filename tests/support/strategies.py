@@ -17,7 +17,7 @@ from pyvista_vdi.model.chunked import VOXEL_TYPES
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.volume import Volume
-from pyvista_vdi.raycasting import packets
+from pyvista_vdi.raycasting import choose
 
 #: Views of a VDI that :func:`random_view` draws; the hard ones by name.
 VIEWS = (
@@ -180,7 +180,7 @@ def deal_rays(patch, runtime, dealt):
     """
     least = 0.0 if dealt == "packets" else math.inf
     for name in ("LEAST_IN_COMMON", "LEAST_IN_COMMON_OF_SHORT_VECTORS", "LEAST_PIXELS"):
-        patch.setattr(packets, name, least)
+        patch.setattr(choose, name, least)
     if dealt == "one by one":
         patch.setattr(runtime, "is_cpu", False)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from functools import partial
 from typing import Any
@@ -38,7 +39,7 @@ from pyvista_vdi.model.volume import Grid, Volume
 _RECORDS = (Classification, Deferral, GenerationOptions)
 
 
-class InSitu:
+class InSitu(AbstractContextManager["InSitu"]):
     """Writes a series of VDIs of a simulation while it runs. All ranks call it together.
 
     Parameters
@@ -241,9 +242,6 @@ class InSitu:
         self._closed = True
         if self._writer is not None:
             self._writer.close()
-
-    def __enter__(self) -> InSitu:
-        return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is not None:  # maybe on this rank alone

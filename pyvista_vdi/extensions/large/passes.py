@@ -9,7 +9,7 @@ other, and merged to the budget.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -31,12 +31,11 @@ from pyvista_vdi.extensions.large.blocks import (
     with_halo,
 )
 from pyvista_vdi.generation.list_arrays import GrowingLists
-from pyvista_vdi.generation.march import March, Records
-from pyvista_vdi.generation.slices import CHUNK_STEPS, Slice, Slices
+from pyvista_vdi.generation.march import CHUNK_STEPS, March, Records, Slice, Slices
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import held_unit_distance
 from pyvista_vdi.model.options import GenerationOptions, GenerationRequest
-from pyvista_vdi.model.ray_forms import Rectangle, pixels_of_points
+from pyvista_vdi.model.ray_forms import Rectangle, packed, pixels_of_points
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.classified_volume import DeviceVolume
@@ -195,14 +194,13 @@ class Task:
         with self._medium(block, own) as medium:
             runtime, options = medium.runtime, self.options
             slices = Slices(runtime, window.size, options)
-            with (
-                runtime.upload(light.astype(np.float32), "light that enters") as entering,
-                Records(
-                    runtime, self.rays, self.camera, self.size, slices, options, window
-                ) as records,
-                March(records, medium, self.camera, entering) as march,
-            ):
-                for part in slices:
+            with ExitStack() as stack:
+                keep = stack.enter_context
+                entering = keep(runtime.upload(light.astype(np.float32), "light that enters"))
+                view = self.rays, self.camera, self.size
+                records = Records(runtime, *view, slices, options, keep, window)
+                march = March(records, medium, self.camera, keep, entering)
+                for part in slices.parts:
                     records.begin(part)
                     for chunk in march.chunks(part):
                         march.advance(chunk)
@@ -222,13 +220,12 @@ class Task:
         runtime, width, options = get_runtime(self.device), self.size[0], self.options
         window = Rectangle(0, width, y0, y1)
         slices = self._slices_to_merge(runtime, y1 - y0)
-        with (
-            Records(runtime, self.rays, self.camera, self.size, slices, options, window) as made,
-            GrowingLists(
-                runtime, (width, y1 - y0), options.max_supersegments, slices.rows * width
-            ) as lists,
-        ):
-            for part in slices:
+        with ExitStack() as stack:
+            keep, view = stack.enter_context, (self.rays, self.camera, self.size)
+            made = Records(runtime, *view, slices, options, keep, window)
+            size, limit = (width, y1 - y0), options.max_supersegments
+            lists = keep(GrowingLists(runtime, size, limit, slices.rows * width))
+            for part in slices.parts:
                 made.begin(part)
                 first = y0 + part.first_row
                 for piece in filter(None, pieces):
@@ -237,11 +234,9 @@ class Task:
                         _append(made, of_part)
                         made.make_room()  # each ray by what it has itself, whatever the rows
                 made.fit()
-                if part.number > 0:
-                    lists.wait()
                 made.pack(lists)
-            offsets, *arrays = lists.finished()
-        return np.diff(offsets).astype(np.uint32), *arrays
+            arrays: Any = lists.finished()  # on the host: none were to stay
+        return np.diff(arrays.offsets).astype(np.uint32), *arrays[1:]
 
     def may_be_visible(self, low: float, high: float) -> bool:
         """Return whether anything between two scalars, that are not NaN, is not transparent."""
@@ -291,7 +286,7 @@ class Task:
         columns, rows = window.size
         voxel = min(medium.grid.spacing) / medium.sample_distance * (1 + 1e-9)
         with (
-            runtime.upload(march.packed(), "rays") as forms,
+            runtime.upload(packed(march.forms), "rays") as forms,
             runtime.buffer((rows, columns), name="optical depths") as depths,
         ):
             launch = RayLaunch(

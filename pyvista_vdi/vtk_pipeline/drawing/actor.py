@@ -223,9 +223,9 @@ class VDIActorMethods:
         driver.drop()
         driver.failed = ()
         driver.said.clear()
-        matrix = as_array(self.GetMatrix())
-        renderer = driver.renderer()
-        source.note_scene(driver.renderers, matrix)
+        matrix, renderers = as_array(self.GetMatrix()), driver.renderers
+        renderer = renderers[0] if renderers else None
+        source.note_scene(renderers, matrix)
         if camera is not None:
             source.SetCamera(camera, matrix)
         elif renderer is not None:

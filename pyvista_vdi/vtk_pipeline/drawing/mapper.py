@@ -21,16 +21,6 @@ from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
 COARSEST = 4.0
 
 
-def _on_start(mapper: Any, event: str) -> None:
-    driver = mapper.driver
-    driver.begin(mapper)
-    driver.box.begin(driver.actor())
-
-
-def _on_end(mapper: Any, event: str) -> None:
-    mapper.driver.end()
-
-
 class VDIMapperMethods:
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
@@ -45,9 +35,9 @@ class VDIMapperMethods:
         self.SetMaximumImageSampleDistance(COARSEST)
         super().SetScalarModeToUsePointData()  # type: ignore[misc]
         super().SetInputConnection(self.driver.box.GetOutputPort())  # type: ignore[misc]
-        # Plain functions: they get the mapper from VTK and hold nothing
-        self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
-        self.AddObserver("VolumeMapperRenderEndEvent", _on_end)
+        # Methods of what does not hold the mapper, which they get from VTK
+        self.AddObserver("VolumeMapperRenderStartEvent", self.driver.begin)
+        self.AddObserver("VolumeMapperRenderEndEvent", self.driver.end)
 
     def SetSampleDistance(self, distance: float) -> None:
         """Set the length of a step, model units, from which the VDI is regenerated."""
@@ -96,7 +86,7 @@ class VDIMapperMethods:
         source = self.driver.input
         if source is None:
             return None
-        return source.last() if isinstance(source, VDISource) else source.vdi()
+        return source.last if isinstance(source, VDISource) else source.vdi()
 
     def GetSource(self) -> VDISource | None:
         """Return the :class:`VDISource` at the input, if it is one."""

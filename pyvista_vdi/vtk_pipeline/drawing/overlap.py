@@ -15,8 +15,7 @@ import numpy as np
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.raycasting.multi_vdi import OwnedImage, PlacedVDI, owned_image
-from pyvista_vdi.vtk_pipeline.drawing.depth import ends_of_rays, opaque_depth
-from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, depths_of
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, depths_of, ends_of_rays, opaque_depth
 from pyvista_vdi.vtk_pipeline.drawing.images import Drawn
 from pyvista_vdi.vtk_pipeline.drawing.window import ShownVolume, now
 

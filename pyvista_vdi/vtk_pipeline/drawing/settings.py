@@ -27,15 +27,10 @@ class MapperSettings:
     regenerate_below: float | None = None
     opacity_multiplier: float = 1.0
     transmittance_cutoff: float = TRANSMITTANCE_CUTOFF
-    target_fps: float | None = None  # the window's desired update rate
+    target_fps: float | None = None  # the window's desired update rate; 0: no previews
     image_distance: float = 1.0
     adjust: bool = True
     off_screen: bool = False
-
-    @property
-    def previews(self) -> bool:
-        """Whether a frame of a motion may have fewer rays."""
-        return self.adjust and self.target_fps != 0
 
 
 _DECLARED = RenderOptions.declared | DrawingOptions.declared

@@ -123,21 +123,16 @@ def named_pair(name: str, what: str, *methods: Callable[..., Any]) -> Any:
     return methods
 
 
-class HeldByVTK:
-    """A VTK object that an attribute keeps alive in C++ alone: what the user hands to an algorithm.
+def held_by_vtk(thing: Any) -> vtk.vtkCollection:
+    """Return what keeps a VTK object alive in C++ alone: what the user hands to an algorithm.
 
     Before 9.7 VTK frees a node of its table of wrappers twice (``vtkPythonUtil::FindObject``)
     where the attributes of an algorithm that is gone are the last in Python to hold an object
     of a Python class, such as a ``pyvista.VolumeProperty``, that lives on in C++.
     """
-
-    def __init__(self, thing: Any) -> None:
-        self._holder = vtk.vtkCollection()
-        self._holder.AddItem(thing)
-
-    def get(self) -> Any:
-        """Return the object."""
-        return self._holder.GetItemAsObject(0)
+    held = vtk.vtkCollection()
+    held.AddItem(thing)
+    return held
 
 
 class SceneAlgorithm(Algorithm):
@@ -154,8 +149,8 @@ class SceneAlgorithm(Algorithm):
     )
     _, GetCamera = accessors("camera", "the view, as it was set; ``None`` where none was")
 
-    _property: HeldByVTK | None = None
-    _observed: Sequence[tuple[HeldByVTK, int]] = ()
+    _property: vtk.vtkCollection | None = None  # with it alone
+    _observed: Sequence[tuple[vtk.vtkCollection, int]] = ()  # each with what observes it
 
     def SetCamera(
         self, camera: CameraLike | None, model_transform: ArrayLike | None = None
@@ -189,18 +184,18 @@ class SceneAlgorithm(Algorithm):
         if prop is not None:
             check_property(prop, rgba=not prop.GetIndependentComponents())
         if prop is not self.GetVolumeProperty():
-            self._property = None if prop is None else HeldByVTK(prop)
+            self._property = None if prop is None else held_by_vtk(prop)
             self._observe_property()
             self.Modified()
 
     def GetVolumeProperty(self) -> Any:
         """Return the volume property."""
-        return None if self._property is None else self._property.get()
+        return None if self._property is None else self._property.GetItemAsObject(0)
 
     def _observe_property(self) -> None:
         """Modify this algorithm whenever the property or one of its functions is modified."""
         for watched, tag in self._observed:
-            watched.get().RemoveObserver(tag)
+            watched.GetItemAsObject(0).RemoveObserver(tag)
         self._observed, prop = [], self.GetVolumeProperty()
         if prop is None:
             return
@@ -212,7 +207,7 @@ class SceneAlgorithm(Algorithm):
             algorithm._observe_property()  # its functions may be others now
             algorithm.Modified()
 
-        self._observed = [(HeldByVTK(each), watch(each, self, changed)) for each in there]
+        self._observed = [(held_by_vtk(each), watch(each, self, changed)) for each in there]
 
 
 def watch(
