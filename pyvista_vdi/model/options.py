@@ -259,14 +259,6 @@ class Deferral(Options):
         """Whether values are kept."""
         return self.classification == "deferred"
 
-    def refuse_target(self, target: QualityTarget) -> None:
-        """Refuse, where values are kept, a target by which settings would be chosen."""
-        if self.deferred and target:
-            raise UnsupportedError(
-                f"{', '.join(target.given)} choose settings by a look, which a deferred VDI does "
-                "not have: give max_supersegments"
-            )
-
 
 @dataclass(frozen=True)
 class QualityTarget(Options):
@@ -308,6 +300,14 @@ class QualityTarget(Options):
     def __bool__(self) -> bool:
         """Whether anything is asked for, so that settings are to be chosen."""
         return (self.ssim, self.full_fps, self.max_bytes) != (None, None, None)
+
+    def refuse_deferred(self) -> None:
+        """Refuse to choose settings where values are kept, whatever their look."""
+        if self:
+            raise UnsupportedError(
+                f"{', '.join(self.given)} choose settings by a look, which a deferred VDI does "
+                "not have: give max_supersegments"
+            )
 
 
 @dataclass(frozen=True, eq=False)
