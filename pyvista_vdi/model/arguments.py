@@ -63,8 +63,7 @@ def documented(
 ) -> str:
     """Return a docstring that has entries for the options among some parameters, in their order.
 
-    Entries that it has stay, one parameter each. Where it has no section Raises, there is one then,
-    of ``_RAISES``.
+    Entries of single parameters that it has stay; where it has no section Raises, it gets one.
     """
     head, *others = re.split(r"\n\n(?=[A-Z][a-z]+\n-+\n)", inspect.cleandoc(text or ""))
     sections = dict.fromkeys(("Parameters", "Returns", "Raises"), "")
