@@ -26,7 +26,7 @@ from pyvista_vdi.model.types import (
     WindowSize,
 )
 from pyvista_vdi.model.vdi import DeferredVDI
-from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit, Pick, pick_vdi
+from pyvista_vdi.raycasting.picking import FirstHit, Pick, pick_vdi
 
 #: Options of pictures of one VDI.
 _OF_ONE = ("preview_samples", "transmittance_cutoff")
@@ -41,7 +41,7 @@ def render(
     *,
     clipping_planes: ArrayLike | Sequence[ArrayLike | None] | None = None,
     cropping: CroppingLike | None = None,
-    opacity_multiplier: float | Sequence[float] = 1.0,
+    opacity_multiplier: float | Sequence[float] = RenderOptions.opacity_multiplier,
     opaque_depth: ArrayLike | None = None,
     model_transforms: Sequence[ArrayLike] | None = None,
     device: DeviceLike | None = None,
@@ -70,11 +70,11 @@ def render(
     numpy.ndarray
         float32 (H, W, 4), premultiplied RGBA, top row first, no background blended in.
     """
-    view, several = Camera.from_any(camera), isinstance(vdi, list | tuple)
+    view = Camera.from_any(camera)
     shown: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
     if look:
         shown = _with_look(shown, look, render, device)
-    if several or model_transforms is not None:
+    if isinstance(vdi, list | tuple) or model_transforms is not None:
         for name in options.given:
             raise InvalidArgumentError(f"{name} is for a single VDI: leave it out for several")
         from pyvista_vdi.raycasting.multi_vdi import common_window_size, placed_vdis, render_vdis
@@ -105,15 +105,14 @@ def render(
     return render_vdi(one, request)
 
 
-@takes(options=RenderOptions, without=_OF_ONE)
+@takes(options=RenderOptions, hit=FirstHit, without=_OF_ONE)
 def render_depth(
     vdi: ShownLike,
     camera: CameraLike,
     options: RenderOptions,
+    hit: FirstHit,
     window_size: WindowSize | None = None,
     *,
-    opacity_threshold: float = DEFAULT_OPACITY,
-    accumulated: bool = True,
     opaque_depth: ArrayLike | None = None,
     device: DeviceLike | None = None,
     **look: Any,
@@ -124,8 +123,6 @@ def render_depth(
     ----------
     vdi : VDI or VDISet or vtkImageData
         As for :func:`render`.
-    opacity_threshold, accumulated
-        What counts as a hit: as for :func:`pick`.
 
     Returns
     -------
@@ -140,19 +137,18 @@ def render_depth(
     request = FrameRequest(view, size, options, opaque_depth, device)
     from pyvista_vdi.raycasting.raycast import render_first_hits
 
-    return render_first_hits(seen, request, FirstHit.of(opacity_threshold, accumulated))
+    return render_first_hits(seen, request, hit)
 
 
-@takes(options=RenderOptions, without=_OF_ONE)
+@takes(options=RenderOptions, hit=FirstHit, without=_OF_ONE)
 def pick(
     vdi: ShownLike,
     camera: CameraLike,
     pixel: Sequence[float],
     options: RenderOptions,
+    hit: FirstHit,
     window_size: WindowSize | None = None,
     *,
-    opacity_threshold: float = DEFAULT_OPACITY,
-    accumulated: bool = True,
     opaque_depth: float | None = None,
     **look: Any,
 ) -> Pick | None:
@@ -166,15 +162,6 @@ def pick(
     pixel : (float, float)
         x and y in pixels, VTK's display coordinates: whole numbers are pixels' centres and y = 0
         is the bottom row, so that pixel (x, y) is ``image[height - 1 - y, x]`` of a picture.
-    opacity_threshold : float
-        Opacity that the hit has to reach, at least 0 and less than 1; the default is that of
-        VTK's pickers for volumes. With 0, whatever absorbs light at all is hit.
-    accumulated : bool, default: True
-        Compare the opacity of the ray from its beginning, 1 - exp(-(tau_0 + ... + tau_k)): the hit
-        is the first supersegment with which the ray has become as opaque as that. ``False``
-        compares each supersegment's own, 1 - exp(-tau_k) over the length that the ray crosses
-        of it, and looks through haze; but it depends on how finely the lists are cut, and where
-        the ray runs across the lists, it crosses little of each.
     opaque_depth : float, optional
         View depth at which the ray ends, world units.
 
@@ -194,7 +181,7 @@ def pick(
     stored = vdi[vdi.nearest(view)] if isinstance(vdi, VDICollection) and look else vdi
     kept = stored if isinstance(stored, DeferredVDI) else None
     request = FrameRequest(view, size, options, opaque_depth)
-    return pick_vdi(seen, request, pixel, FirstHit.of(opacity_threshold, accumulated), kept)
+    return pick_vdi(seen, request, pixel, hit, kept)
 
 
 @takes(look=Classification, medium=MediumOptions, options=RenderOptions, without=_OF_ONE)

@@ -83,12 +83,12 @@ def generate(
     >>> vdi = pvdi.generate(volume, camera, (640, 360), cmap="bone")  # doctest: +SKIP
     """
     read = as_volume(volume, look.scalars, look.preference)
-    if deferral.deferred:
+    keeps = deferral.deferred
+    if keeps:
         look.require_no_look()
-        deferral.refuse_target(target)
+        target.refuse_deferred()
     from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 
-    keeps = deferral.deferred
     table = unclassified(look.interpolation) if keeps else look.transfer_function_of(read)
     view: Any = camera
     size: Any = window_size  # which the request checks, as the view

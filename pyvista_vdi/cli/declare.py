@@ -92,7 +92,6 @@ _CALLED = {
     "int": "N",
     "float": "X",
     "RangeLike": "LOW HIGH",
-    "ArrayLike": "A,B,...",
     "OpacityLike": "NAME|A,B,...",
 }
 _RECORDS = (RenderOptions, DrawingOptions, Classification, Deferral, GenerationOptions)

@@ -46,11 +46,6 @@ class _LengthOptions(GenerationOptions):
     """Options under which merging counts lengths alone, of a medium of :data:`_PER_VOXEL`."""
 
     @property
-    def hidden_weight(self) -> float:
-        """1: what V_O sees makes no difference."""
-        return 1.0
-
-    @property
     def finest_error(self) -> float:
         """As little as the features of such a medium are, squared."""
         return super().finest_error * _PER_VOXEL**2
@@ -73,7 +68,8 @@ def generate_deferred(
     made = generate(
         request.replace(
             transfer_function=_keeping(request, (low, high)),
-            options=_LengthOptions(**{**given, "precision": "exact"}),
+            # Served from everywhere: what V_O sees makes no difference
+            options=_LengthOptions(**{**given, "precision": "exact", "view_cone": 90.0}),
         )
     )
     if made is None:

@@ -63,15 +63,14 @@ def documented(
 ) -> str:
     """Return a docstring that has entries for the options among some parameters, in their order.
 
-    Entries that it has stay. Where it has no section Raises, there is one then, of ``_RAISES``.
+    Entries of single parameters that it has stay; where it has no section Raises, it gets one.
     """
     head, *others = re.split(r"\n\n(?=[A-Z][a-z]+\n-+\n)", inspect.cleandoc(text or ""))
     sections = dict.fromkeys(("Parameters", "Returns", "Raises"), "")
     sections |= {each.partition("\n")[0]: each for each in others}
     described: dict[str, str] = {}
     for entry in re.split(r"\n(?=\w)", sections["Parameters"])[1:]:
-        names = entry.partition("\n")[0].partition(" :")[0]
-        described |= dict.fromkeys(names.split(", "), entry)
+        described[entry.partition(" :")[0]] = entry
     entries = ["Parameters\n----------"]
     for name, parameter in parameters.items():
         if name in options and name not in described:
@@ -86,7 +85,7 @@ def documented(
             said = textwrap.indent(textwrap.fill(said, 96, break_long_words=False), "    ")
             described[name] = f"{name} : {kind}{optional}\n{said}"
         entries.append(described.get(name, ""))
-    sections["Parameters"] = "\n".join(filter(None, dict.fromkeys(entries)))
+    sections["Parameters"] = "\n".join(filter(None, entries))
     raised = [_RAISES[name] for name in ("", *parameters) if name in _RAISES]
     sections["Raises"] = sections["Raises"] or "\n".join(["Raises\n------", *raised])
     return "\n\n".join([head, *filter(None, sections.values())])

@@ -61,9 +61,6 @@ QUALITIES: dict[str, float | None] = {
     "fast": 0.93,
 }
 
-#: Merge error that no picture shows: a difference of a thousandth of full opacity over one voxel.
-_INDISTINGUISHABLE = 1e-6
-
 
 @dataclass
 class Option:
@@ -98,7 +95,8 @@ class Option:
             self.standard = self.check(self.default)
 
 
-#: What the docstring of a record says of a field: its name, ``what``, and ``more``.
+#: What the docstring of a record says of a field: its name, ``what``, and ``more``. Where Python
+#: drops docstrings (-OO) options are not described, and all else is as it is.
 _TEXT = re.compile(r"^(\w+): (.+)((?:\n +.+)*)", re.MULTILINE)
 
 
@@ -219,15 +217,11 @@ class GenerationOptions(MediumOptions):
     precision: Precision = "exact"
 
     @property
-    def hidden_weight(self) -> float:
-        """Weight of what V_O cannot see at all when neighbours are merged, 0 to 1."""
-        return float(1 - np.cos(np.radians(self.view_cone)))
-
-    @property
     def finest_error(self) -> float:
         """Merge error up to which neighbours are always merged."""
-        # Differences stay below 1e18, whose square float32 still holds
-        return max(min(self.tolerance, 1e18) ** 2, _INDISTINGUISHABLE)
+        # Differences stay below 1e18, whose square float32 still holds, and no picture shows one of
+        # a thousandth of full opacity over one voxel
+        return max(min(self.tolerance, 1e18) ** 2, 1e-6)
 
 
 @dataclass(frozen=True)
@@ -264,14 +258,6 @@ class Deferral(Options):
     def deferred(self) -> bool:
         """Whether values are kept."""
         return self.classification == "deferred"
-
-    def refuse_target(self, target: QualityTarget) -> None:
-        """Refuse, where values are kept, a target by which settings would be chosen."""
-        if self.deferred and target:
-            raise UnsupportedError(
-                f"{', '.join(target.given)} choose settings by a look, which a deferred VDI does "
-                "not have: give max_supersegments"
-            )
 
 
 @dataclass(frozen=True)
@@ -314,6 +300,14 @@ class QualityTarget(Options):
     def __bool__(self) -> bool:
         """Whether anything is asked for, so that settings are to be chosen."""
         return (self.ssim, self.full_fps, self.max_bytes) != (None, None, None)
+
+    def refuse_deferred(self) -> None:
+        """Refuse to choose settings where values are kept, whatever their look."""
+        if self:
+            raise UnsupportedError(
+                f"{', '.join(self.given)} choose settings by a look, which a deferred VDI does "
+                "not have: give max_supersegments"
+            )
 
 
 @dataclass(frozen=True, eq=False)

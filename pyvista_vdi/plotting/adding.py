@@ -263,7 +263,7 @@ def _of_vdi(shown: VDI, asked: Addition) -> _Shown:
 
 def _of_late_values(volume: Any, asked: Addition) -> _Shown:
     """Return the values of a volume, which the first picture has made for its view."""
-    asked.deferral.refuse_target(asked.target)
+    asked.target.refuse_deferred()
     fixed = {"coverage": asked.drawing.coverage != "bounds", "draw": asked.drawing.draw == "volume"}
     refused = " and ".join(each for each, given in fixed.items() if given)
     if refused:
