@@ -280,7 +280,6 @@ class PreparedVDI:
 
     def _prepare(self, vdi: VDI, keep: Keep) -> None:
         """Bring the lists to the device, exact or packed, and build the occupancy grid."""
-        runtime = self.runtime
         with contextlib.ExitStack() as stack:
             if vdi.packing is not None:
                 self._prepare_packed(vdi, vdi.packing, keep, stack.enter_context)
@@ -288,13 +287,13 @@ class PreparedVDI:
                 # Take the lists from where they were made, or upload them
                 held: dict[str, Any] = {}
                 if hasattr(vdi.late, "on"):
-                    held |= stack.enter_context(vdi.late.on(runtime))
+                    held |= stack.enter_context(vdi.late.on(self.runtime))
                 if not held:
                     arrays: Any = zip(_ARRAYS.items(), vdi.arrays, strict=True)
                     for (name, what), array in arrays:
-                        held[name] = stack.enter_context(runtime.upload(array, what))
+                        held[name] = stack.enter_context(self.runtime.upload(array, what))
                 self._prepare_lists(held, self._place_bundles(held, stack.enter_context), keep)
-        if runtime.is_cpu:
+        if self.runtime.is_cpu:
             self.lit = _share_lit(vdi, *self.depths)
 
     def _prepare_packed(self, vdi: VDI, packing: Packed8, keep: Keep, briefly: Keep) -> None:
