@@ -13,12 +13,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from baselines import CRITERIA, RECORDED, cut
-from shared import Case, Results, benches, execute, mean_of, parser_of, table  # beside this file
+from shared import LOOKS, Case, Results, benches, execute, mean_of, parser_of, table
 
 from pyvista_vdi import generate
 from pyvista_vdi.measure.bench import accuracy
 from pyvista_vdi.model.options import QUALITIES
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from pyvista_vdi.quality.targets import TARGET_ANGLE, turned
 from pyvista_vdi.quality.view_error import ViewErrorEstimator
 from pyvista_vdi.raycasting.prepared import prepared_vdi
@@ -57,7 +56,7 @@ def cases_of(options: Any) -> Iterator[Case]:
     """Yield every case, the default of each look first."""
     size = tuple(options.size)
     for volume in options.volumes:
-        for look in TRANSFER_FUNCTIONS:
+        for look in LOOKS:
             if look != "soft" and volume in SOFT_ONLY:
                 continue
             for setting in SETTINGS:

@@ -156,7 +156,7 @@ class WorldRays:
         """Return a window's rays: coordinates, model direction, planes to clip to; and how many."""
         vdi = self._vdi
         pixel_rays = rays.pixel_rays(camera, size, vdi.bounds)
-        u, v, depth, d = (pixel_rays.form(row[:3], row[3]) for row in self._to_lists)
+        u, v, depth, d = pixel_rays.forms(self._to_lists)
         planes = [
             *rays.box_planes(pixel_rays, vdi.bounds),
             *(u, v, self._wide * d - u, self._high * d - v),

@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from shared import ROOMS, Case, Latest, Results, execute, load, mean_of, parser_of, table
+from shared import LOOKS, ROOMS, Case, Latest, Results, execute, load, mean_of, parser_of, table
 
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.plotting.volumes import to_image_data
 from pyvista_vdi.vtk_pipeline.filters.view import aim
 
@@ -76,7 +76,7 @@ def adders(device: Any) -> dict[str, Any]:
 
 def screenshots(grid: Any, case: Case, repeats: int, device: Any) -> dict[str, Any]:
     """Return seconds of a whole script each time: plotter, volume, picture, close; in turns."""
-    look = {**TRANSFER_FUNCTIONS[case.look or ""], "show_scalar_bar": False}
+    look = {**LOOKS[case.look or ""], "show_scalar_bar": False}
     view, add = filling_camera(grid.bounds, case.window_size), adders(device)
     seconds: dict[str, list[float]] = {"vdi_auto": [], "add_volume": []}
     for repeat in range(repeats + 1):
@@ -95,7 +95,7 @@ def screenshots(grid: Any, case: Case, repeats: int, device: Any) -> dict[str, A
 
 def film(grid: Any, case: Case, device: Any) -> dict[str, Any]:
     """Return seconds of a film's pictures by who draws it, in turns; what drew ours, and SSIM."""
-    look = {**TRANSFER_FUNCTIONS[case.look or ""], "show_scalar_bar": False}
+    look = {**LOOKS[case.look or ""], "show_scalar_bar": False}
     view, add = filling_camera(grid.bounds, case.window_size), adders(device)
     peers = ("vdi_volume",) if case.what == ARC else tuple(f"vtk_{mapper}" for mapper in MAPPERS)
     with ExitStack() as stack:

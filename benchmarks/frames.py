@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from shared import (  # beside this file
+    LOOKS,
     ROOMS,
     Case,
     Latest,
@@ -34,7 +35,7 @@ from shared import (  # beside this file
 from pyvista_vdi.measure.bench import ratio, take_turns
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.standard_cases import ANGLES, TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.plotting.volumes import to_image_data
 from pyvista_vdi.vtk_pipeline.filters.view import aim
 
@@ -43,6 +44,7 @@ VOLUMES = (
     *("visible_female_head", "allen_mouse_brain", "kingsnake_like"),
     *("aneurism", "bonsai", "embryo", "heptane", "berea"),
 )
+ANGLES = (0.0, 5.0, 30.0)
 #: What is measured, and the plotter's samples per pixel; ``None`` is PyVista's default.
 PARTS: dict[str, int | None] = {
     "whole frames at PyVista's defaults": None,
@@ -89,7 +91,7 @@ def whole_frames(volume: Any, case: Case, repeats: int, device: Any) -> dict[str
     And the SSIM, by angle, of what `add_vdi` and `add_volume` with VTK's GPU mapper show.
     """
     grid, view = to_image_data(volume), filling_camera(volume.bounds, case.window_size)
-    look = {**TRANSFER_FUNCTIONS[case.look or ""], "show_scalar_bar": False}
+    look = {**LOOKS[case.look or ""], "show_scalar_bar": False}
     # All rays, and this VDI alone, however long a frame takes
     ours = {"draw": "vdi", "regenerate": "never", "target_fps": None, "device": device}
     with ExitStack() as stack:

@@ -78,12 +78,12 @@ def plotter(options: argparse.Namespace) -> Iterator[tuple[Any, ...]]:
     import pyvista as pv
 
     from pyvista_vdi import examples
-    from pyvista_vdi.vtk_pipeline.drawing.screen import ImageTexture
+    from pyvista_vdi.vtk_pipeline.drawing.screen import Textures
 
-    show = ImageTexture.show
+    show = Textures.show
 
-    def kept(texture: Any, window: Any, image: Any, *, smooth: bool) -> int:
-        return show(texture, window, texture._uploaded, smooth=smooth)
+    def kept(textures: Any, window: Any, mapper: Any, image: Any, *, smooth: bool) -> int:
+        return show(textures, window, mapper, textures._uploaded, smooth=smooth)
 
     yield "frame", "ms"
     for what in ("empty", "kept picture", "turned", "no upload", "no headlight", "opaque mesh"):
@@ -102,14 +102,14 @@ def plotter(options: argparse.Namespace) -> Iterator[tuple[Any, ...]]:
 
         for turn in range(3 + options.repeats):
             if turn == 3 and what == "no upload":
-                ImageTexture.show = kept
+                Textures.show = kept
             if what != "kept picture":
                 plot.camera.azimuth += 0.5
             began = time.perf_counter()
             plot.render()
             plot.render_window.WaitForCompletion()
             found.append(time.perf_counter() - began)
-        ImageTexture.show = show
+        Textures.show = show
         yield what, milliseconds(statistics.median(found[3:]))
         plot.close()
 

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from scipy.stats import mannwhitneyu
-from shared import CHECKOUT, Case, Results, execute, mean_of, parser_of, table  # beside this file
+from shared import CHECKOUT, LOOKS, Case, Results, execute, mean_of, parser_of, table
 
 from pyvista_vdi.measure import bench
 
@@ -46,7 +46,7 @@ SWITCHES = {
 WORKER = """
 import hashlib, json, sys, time
 import pyvista_vdi as pvdi
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.model.standard_cases import filling_camera
 
 made, key = {}, None
 for line in sys.stdin:
@@ -56,11 +56,10 @@ for line in sys.stdin:
         made.clear()
         key = now
         made["volume"] = pvdi.examples.load_data(order["volume"], as_volume=True)
-        made["look"] = TRANSFER_FUNCTIONS[order["look"]]
     size, device = order["size"], order["device"]
     view = filling_camera(made["volume"].bounds, size)
     def generate():
-        return pvdi.generate(made["volume"], view, size, device=device, **made["look"])
+        return pvdi.generate(made["volume"], view, size, device=device, **order["look"])
     if order["what"] == "frame":
         if "vdi" not in made:
             made["vdi"] = generate()
@@ -70,7 +69,7 @@ for line in sys.stdin:
     elif order["what"] == "render_volume":
         camera = view.azimuth(order["angle"])
         def work():
-            return pvdi.render_volume(made["volume"], camera, size, device=device, **made["look"])
+            return pvdi.render_volume(made["volume"], camera, size, device=device, **order["look"])
     else:
         work = generate
     cpu, wall = time.process_time(), time.perf_counter()
@@ -148,7 +147,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         def once(name: str, case: Case) -> dict[str, Any]:
             given = {"size": list(options.size), "device": options.device}
-            given |= {"volume": case.volume, "look": case.look, "what": case.what}
+            given |= {"volume": case.volume, "look": LOOKS[case.look or ""], "what": case.what}
             return trees[name].ask(angle=case.angle, **given)
 
         def measure(case: Case) -> dict[str, Any]:

@@ -53,9 +53,6 @@ registry.core = registry.Extension(
             values=True,
         ),
     ),
-    readers={
-        "": "pyvista_vdi.plotting.imports:volumes_in",
-    },
     methods={
         "Camera.to_pyvista": "pyvista_vdi.plotting.imports:camera_to_pyvista",
         "DeferredVDI.classified": "pyvista_vdi.api.vdis:classified",
@@ -70,20 +67,20 @@ registry.core = registry.Extension(
         "Volume.read": "pyvista_vdi.io.volumes:read_volume",
         "Volume.from_vtk": "pyvista_vdi.vtk_pipeline:volume_from_vtk",
         "Volume.with_scalars": "pyvista_vdi.plotting.volumes:as_grid",
+        "volumes_in": "pyvista_vdi.plotting.imports:volumes_in",
     },
 )
 
 
 def __getattr__(name: str) -> Any:
     if name == "__all__":
-        return ["__version__", "errors", "examples", *sorted([*_HOMES, *registry.names()])]
+        added = (n for each in registry.records() for n in each.names)
+        return ["__version__", "errors", "examples", *sorted([*_HOMES, *added])]
     if name == "examples":
         return importlib.import_module(".examples", __name__)
     if name in _HOMES:
         value = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
-    elif not name.startswith("_") and name in registry.names():
-        value = registry.load(registry.names()[name])
-    else:
+    elif name.startswith("_") or (value := registry.placed("names", name)) is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value  # also where a submodule of the same name has been imported
     return value

@@ -63,11 +63,8 @@ class Extension:
 
     names: Places = field(default_factory=dict)  # public names of pyvista_vdi
     formats: tuple[FileFormat, ...] = ()
-    readers: Places = field(default_factory=dict)  # of volumes, by ends of files' names
-    shown: Places = field(default_factory=dict)  # what makes a mapper's Input, by classes of data
-    generators: Places = field(default_factory=dict)  # of chunked volumes: "blocks"
     verbs: tuple[Verb, ...] = ()
-    methods: Places = field(default_factory=dict)  # of a VDI, or "plotter.vdi.export_html"
+    methods: Places = field(default_factory=dict)  # that lower rooms call, by names for them
     requires: tuple[str, ...] = ()  # extensions without which it is left out
 
 
@@ -106,38 +103,21 @@ def formats() -> Iterator[FileFormat]:
         yield from each.formats
 
 
-def names() -> dict[str, str]:
-    """Return the public names that extensions add, and their places."""
-    return {name: place for each in extensions().values() for name, place in each.names.items()}
-
-
-def verbs() -> dict[str, Verb]:
-    """Return the verbs that extensions add, by their names."""
-    return {verb.name: verb for each in extensions().values() for verb in each.verbs}
-
-
 def method(name: str, otherwise: Any = None) -> Any:
     """Return the function that a method calls, ``otherwise`` where no extension has it.
 
     MissingDependencyError is raised where that is ``None``.
     """
-    return placed("methods", name, otherwise, missing=name)
-
-
-def shown(data: Any) -> Any:
-    """Return the function that makes of data what a mapper draws, by their class, or None."""
-    kinds = (f"{kind.__module__}:{kind.__qualname__}" for kind in type(data).__mro__[:-1])
-    return next((make for kind in kinds if (make := placed("shown", kind)) is not None), None)
-
-
-def placed(what: str, name: str, otherwise: Any = None, missing: str = "") -> Any:
-    """Return what a record places under a name; the core's is looked at first."""
-    for each in records():
-        if name in getattr(each, what):
-            return load(getattr(each, what)[name])
-    if otherwise is None and missing:
+    found = placed("methods", name) or otherwise
+    if found is None:
         raise MissingDependencyError(
-            f"{missing} is of an extension that is not installed (there are: "
+            f"{name} is of an extension that is not installed (there are: "
             f"{', '.join(sorted(extensions())) or 'none'}): install pyvista-vdi whole"
         )
-    return otherwise
+    return found
+
+
+def placed(what: str, name: str) -> Any:
+    """Return what a record places under a name, or None; the core's is looked at first."""
+    places = (getattr(each, what).get(name) for each in records())
+    return next((load(place) for place in places if place is not None), None)

@@ -20,13 +20,19 @@ from pyvista_vdi.cli.declare import size as parse_size
 from pyvista_vdi.cli.text import write_text
 from pyvista_vdi.measure.bench import Bench, as_json
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS
 from shared.volumes import make
 
 CHECKOUT = Path(__file__).parents[2]
 
 #: Where results go by default.
 RESULTS = CHECKOUT / "benchmarks" / "results"
+
+#: Transfer functions of the standard cases by name, as arguments of ``Plotter.add_volume``.
+LOOKS: dict[str, dict[str, Any]] = {
+    "soft": {"cmap": "bone", "opacity": "linear"},
+    "steep": {"cmap": "viridis", "opacity": "sigmoid_10"},
+    "nearly-opaque": {"cmap": "inferno", "opacity": (0.0, 0.0, 0.02, 0.9, 1.0)},
+}
 
 #: Folders whose code decides the figures of a VDI beside volume rendering.
 ROOMS = ("generation", "raycasting", "volume")
@@ -213,8 +219,7 @@ def load(name: str) -> Volume:
 
 def table_of(volume: Volume, look: str | None, **more: Any) -> Any:
     """Return a standard transfer function of a volume, *soft* unless it says otherwise."""
-    arguments = {**TRANSFER_FUNCTIONS[look or "soft"], **more}
-    return Classification(**arguments).transfer_function_of(volume)
+    return Classification(**LOOKS[look or "soft"], **more).transfer_function_of(volume)
 
 
 def benches(options: argparse.Namespace, *, vtk: bool = False) -> Latest:
@@ -273,8 +278,3 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
 def milliseconds(seconds: float | None) -> str:
     """Return a time in milliseconds, to three digits."""
     return "-" if seconds is None else f"{seconds * 1e3:.3g}"
-
-
-def marked(text: str, reached: bool) -> str:
-    """Return a figure, bold where it is not what must be reached."""
-    return text if reached else f"**{text}**"

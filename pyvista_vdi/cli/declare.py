@@ -22,7 +22,6 @@ from pyvista_vdi.model.options import (
     GenerationOptions,
     QualityTarget,
     RenderOptions,
-    declared,
 )
 
 
@@ -93,10 +92,9 @@ _CALLED = {
     "int": "N",
     "float": "X",
     "RangeLike": "LOW HIGH",
-    "ArrayLike": "A,B,...",
     "OpacityLike": "NAME|A,B,...",
 }
-_RECORDS = (RenderOptions, DrawingOptions, Classification, Deferral)
+_RECORDS = (RenderOptions, DrawingOptions, Classification, Deferral, GenerationOptions)
 
 _OPTIONS = """
 output              FILE      .vdi, .exr or .html to write
@@ -117,8 +115,6 @@ azimuth=0           DEGREES   turn by
 elevation=0         DEGREES   lift by
 transfer_function   FILE      TransferFunction.to_dict() as JSON; needs no PyVista
 memory_limit        N         bytes of the device; what does not fit goes there in bricks
-criterion           NAME      where a list is cut: least-error (default) or homogeneity
-max_bytes           N         most bytes of the VDI on the device
 compression         {lz4,zstd,deflate,none}  of .vdi, by default lz4; .html has deflate
 compression_level   N         1 (fast) to 9 (small)
 time                T         of a series, the step nearest in time (default: the first)
@@ -232,7 +228,7 @@ def _add_option(into: Any, name: str, value: str, text: str) -> None:
 def _known() -> dict[str, tuple[str, str, str]]:
     """Return the options that are known by their names: name and default, value, and text."""
     found = {}
-    for name, told in declared(*_RECORDS, GenerationOptions, QualityTarget).items():
+    for told in [told for each in (*_RECORDS, QualityTarget) for told in each.declared.values()]:
         value = _CALLED.get(told.kind.removesuffix(" | None"), "NAME")
         value = "DEGREES" if "degrees" in told.what else value
         value = "{" + ",".join(told.choices) + "}" if told.choices else value
@@ -240,7 +236,7 @@ def _known() -> dict[str, tuple[str, str, str]]:
         plain = isinstance(usual, int | float) and not isinstance(usual, bool)
         text += f" (default: {usual:g})" if plain else ""
         text += f" (default: {usual})" if told.choices and usual else ""
-        found[name] = name, value, text
+        found[told.name] = told.name, value, text
     for line in _OPTIONS.strip().splitlines():
         name, value, text = re.split(" {2,}", line, maxsplit=2)
         found[name.partition("=")[0]] = name, value, text

@@ -21,9 +21,7 @@ from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.io import checked_target
 from pyvista_vdi.io.stores import StoredVolume
-from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import Deferral, GenerationOptions, QualityTarget
 from pyvista_vdi.model.standard_cases import ELEVATION, filling_camera
 from pyvista_vdi.model.volume import Volume
@@ -37,7 +35,6 @@ def generate(options: argparse.Namespace) -> int:
     path, file_arguments = checked_target(options.output), file_options(options)
     QualityTarget(**given(options, QualityTarget, flat=True))
     look = classification(options)
-    records_of(look, "generate", Classification)
     how = given(options, GenerationOptions, QualityTarget, Deferral)
     volume = read_volume(options, in_chunks=True)
     view = generating_view(options, volume)
@@ -49,7 +46,6 @@ def generate(options: argparse.Namespace) -> int:
     with closing(DelayedBar()) as bar:
         vdi = generate_vdi(volume, view, options.size, progress=bar, **how)
     seconds = time.perf_counter() - start
-    file_arguments.pop("precision", None)  # which it has
     with closing(DelayedBar(label="writing it")) as bar:
         vdi.save(path, progress=bar, **file_arguments)
     say_vdi(options, vdi, f", {seconds:.1f} s")
@@ -59,7 +55,7 @@ def generate(options: argparse.Namespace) -> int:
 
 
 def say_vdi(options: argparse.Namespace, vdi: object, more: str = "") -> None:
-    """Print what was written to ``--output``."""
+    """Print what was written to ``--output``, a VDI or several."""
     n_bytes = f"{Path(options.output).stat().st_size / 2**20:.1f} MiB"
     print(f"{printable(options.output)}: {vdi}, {n_bytes}{more}")
 

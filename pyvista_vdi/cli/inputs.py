@@ -11,15 +11,14 @@ from typing import Any, TypeVar
 
 from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError, VDIFileError
-from pyvista_vdi.io import check_writable, check_write_options, stores, volumes
+from pyvista_vdi.io import check_writable, check_write_options, volumes
 from pyvista_vdi.io.files import format_named, holds
 from pyvista_vdi.io.stores import is_store
 from pyvista_vdi.io.volumes.in_file import placed
 from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.classification import Look
+from pyvista_vdi.model.classification import Classification, Look
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 
@@ -30,7 +29,7 @@ OF_VOLUMES = (
     *("scalars", "preference", "spacing", "origin", "level", "channel", "time_index", "series"),
 )
 #: Options that give colours and opacities.
-LOOK = ("transfer_function", *declared(Look))
+LOOK = ("transfer_function", *Look.declared)
 #: Options that say where the eye is, instead of turning the default view.
 PLACE = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")
 
@@ -40,19 +39,23 @@ def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dic
 
     What is seldom turned is in ``settings``, or ``flat`` beside the others.
     """
-    values = {name: getattr(options, name, None) for name in declared(*records)}
-    found = {name: value for name, value in values.items() if value is not None}
+    named = {name for record in records for name in record.declared}
+    found = {n: value for n, value in vars(options).items() if n in named and value is not None}
     seldom = {name: found.pop(name) for name in Settings.declared if name in found and not flat}
     return found | ({"settings": Settings(**seldom)} if seldom else {})
 
 
 def classification(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments that say how the volume looks; which array it is, the volume says."""
+    """Return the arguments that say how the volume looks; which array it is, the volume says.
+
+    What cannot be is refused now, before the volume is read.
+    """
     found = given(options, Look)
     path = getattr(options, "transfer_function", None)
     if path is not None:
         function = from_json(path, TransferFunction.from_dict, "transfer function")
         found["transfer_function"] = function
+    Classification(**found)
     return found
 
 
@@ -102,9 +105,8 @@ def _laid_out(volume: Any, options: argparse.Namespace) -> Volume:
 
 def open_store(options: argparse.Namespace) -> Any:
     """Open the store that is named, with what is asked of it."""
-    asked = {"level": options.level, "channel": options.channel, "time": options.time_index}
-    chosen: Any = {name: value for name, value in asked.items() if value is not None}
-    return stores.StoredVolume(stores.store_at(options.file), **chosen)
+    chosen = {"level": options.level, "channel": options.channel, "time": options.time_index}
+    return volumes.read_volume(options.file, **chosen)
 
 
 def is_volume(options: argparse.Namespace) -> bool:
@@ -128,7 +130,8 @@ def volume_name(options: argparse.Namespace) -> str:
 def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterator[dict[str, Path]]:
     """Yield where ``--out`` has the files go, after finding that they can be written there.
 
-    A folder that is made for them, and into which nothing is written, is gone again.
+    They are named when they are written. A folder that is made for them, and into which nothing is
+    written, is gone again.
     """
     folder = Path(options.out)
     made = not folder.exists()
@@ -139,17 +142,14 @@ def output_files(options: argparse.Namespace, stem: str, *kinds: str) -> Iterato
             f"the folder {folder} cannot be made: {error.strerror}; choose another --out"
         ) from error
     try:
-        yield {kind: check_writable(folder / f"{stem}.{kind}") for kind in kinds}
+        files = {kind: check_writable(folder / f"{stem}.{kind}") for kind in kinds}
+        yield files
     except BaseException:
         if made:
             with suppress(OSError):  # something is there
                 folder.rmdir()
         raise
-
-
-def say_written(files: Iterable[Path | str]) -> None:
-    """Name the files that were written."""
-    print("Written: " + ", ".join(printable(path) for path in files))
+    print("Written: " + ", ".join(map(printable, files.values())))
 
 
 def camera(options: argparse.Namespace, default: Camera) -> Camera:

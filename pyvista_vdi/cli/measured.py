@@ -10,9 +10,9 @@ from typing import Any
 
 from pyvista_vdi.cli.inputs import (
     classification,
+    given,
     output_files,
     read_volume,
-    say_written,
     volume_name,
 )
 from pyvista_vdi.cli.text import write_text
@@ -21,50 +21,44 @@ from pyvista_vdi.io import write_png
 from pyvista_vdi.measure.bench import as_json
 from pyvista_vdi.measure.compare import contact_sheet, measure, table
 from pyvista_vdi.measure.tradeoff import AXES, COSTS, DEFAULT_AXES, measure_tradeoff, sweep
-from pyvista_vdi.model.arguments import records_of
-from pyvista_vdi.model.classification import Classification
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.plotting.progress import DelayedBar
 
 
 def compare(options: argparse.Namespace) -> int:
     """Compare a volume's pictures, and write a table, a picture, a JSON file and the VDI."""
     look = classification(options)
-    records_of(look, "compare", Classification)  # refused before anything is read or written
     stem, volume = volume_name(options), read_volume(options)
-    names = ("angles", "max_supersegments", "precision", "sample_distance", "repeats", "device")
-    how = {n: getattr(options, n) for n in names if getattr(options, n) is not None}
-    bar = DelayedBar(label="comparing")
-    with output_files(options, stem, "vdi", "png", "json") as files, closing(bar):
-        how |= {"vtk": not options.no_vtk, "name": stem, "progress": bar}
-        report, vdi, images = measure(volume, look, options.size, **how)
-    vdi.save(files["vdi"], compression=options.compression)
-    report["sizes"]["file_bytes"] = files["vdi"].stat().st_size
-    write_png(contact_sheet(report, images), files["png"])
-    write_text(files["json"], json.dumps(as_json(report), indent=1) + "\n")
-    print(table(report))
-    say_written(files.values())
+    how = {n: getattr(options, n) for n in ("angles", "repeats", "device")}
+    how |= {"vtk": not options.no_vtk, "name": stem, **given(options, GenerationOptions, flat=True)}
+    with output_files(options, stem, "vdi", "png", "json") as files:
+        with closing(DelayedBar(label="comparing")) as bar:
+            report, vdi, images = measure(volume, look, options.size, progress=bar, **how)
+        vdi.save(files["vdi"], compression=options.compression)
+        report["sizes"]["file_bytes"] = files["vdi"].stat().st_size
+        write_png(contact_sheet(report, images), files["png"])
+        write_text(files["json"], json.dumps(as_json(report), indent=1) + "\n")
+        print(table(report))
     return 0
 
 
 def tradeoff(options: argparse.Namespace) -> int:
     """Measure what each setting costs and gives, and write JSON and tables."""
     look = classification(options)
-    records_of(look, "tradeoff", Classification)  # refused before the volume is read
     settings = sweep(dict(map(_axis, options.sweep or DEFAULT_AXES)))
     name, volume = volume_name(options), read_volume(options)
     how = {n: getattr(options, n) for n in ("angles", "repeats", "generations", "device")}
     how |= {"window_size": options.size, "vtk": not options.no_vtk, "name": name}
-    bar = DelayedBar(label="tradeoff")
-    with output_files(options, f"tradeoff-{name}", "json", "md", "png") as files, closing(bar):
-        found = measure_tradeoff(volume, settings, progress=bar, **how, **look)
-    for kind in COSTS:
-        print(f"{kind} against SSIM: {'; '.join(found.front(kind))}")
-    for worse, better in found.dominated().items():
-        print(f"dominated: {worse} (by {better[0]})")
-    write_text(files["json"], json.dumps(as_json(asdict(found)), indent=1) + "\n")
-    write_text(files["md"], found.table())
-    found.save_plot(files["png"])
-    say_written(files.values())
+    with output_files(options, f"tradeoff-{name}", "json", "md", "png") as files:
+        with closing(DelayedBar(label="tradeoff")) as bar:
+            found = measure_tradeoff(volume, settings, progress=bar, **how, **look)
+        for kind in COSTS:
+            print(f"{kind} against SSIM: {'; '.join(found.front(kind))}")
+        for worse, better in found.dominated().items():
+            print(f"dominated: {worse} (by {better[0]})")
+        write_text(files["json"], json.dumps(as_json(asdict(found)), indent=1) + "\n")
+        write_text(files["md"], found.table())
+        found.save_plot(files["png"])
     return 0
 
 

@@ -33,7 +33,8 @@ def parse(arguments: list[str]) -> argparse.Namespace | None:
 
     Raises UsageError, which suggests what may have been meant.
     """
-    known = {verb.name: verb for verb in VERBS} | registry.verbs()
+    added = (verb for each in registry.records() for verb in each.verbs)
+    known = {verb.name: verb for verb in (*VERBS, *added)}
     name, *rest = arguments or ["--help"]
     if name in ("-h", "--help"):
         listed = "\n".join(f"    {verb.name:<11}{verb.summary}" for verb in known.values())

@@ -25,7 +25,7 @@ from pyvista_vdi.errors import UnsupportedError, VDIWarning
 from pyvista_vdi.io import check_writable, to_bytes, write_png
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.options import DrawingOptions, RenderOptions
-from pyvista_vdi.model.standard_cases import WINDOW_SIZE, filling_camera
+from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.vdi import picture_view
 from pyvista_vdi.model.whole_file import as_path, with_suffix
 from pyvista_vdi.plotting.imports import import_pyvista, why_no_window
@@ -56,7 +56,7 @@ def view(options: argparse.Namespace) -> int:
     if is_volume(options):
         refuse(options, ("time",), "series, .vdis")
         shown: Any = read_volume(options)
-        look, size = classification(options), options.size or WINDOW_SIZE
+        look, size = classification(options), options.size or (1280, 720)
         first = filling_camera(shown.bounds, size)
     else:
         shown = read(options.file)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, kept_together
 from pyvista_vdi.device.constants import GROUP, LISTS_PER_ITEM
-from pyvista_vdi.model.host_memory import GrowingArray, aligned_empty, require_host_memory
+from pyvista_vdi.model.host_memory import aligned_empty, cut_to, require_host_memory, with_room
 from pyvista_vdi.model.packing import Arrays
 
 #: A VDI's arrays of supersegments, as kernels and as messages call them, and an element's shape.
@@ -125,7 +125,7 @@ class GrowingLists(contextlib.AbstractContextManager["GrowingLists"]):
         self._summed_up()  # refuses what lists without supersegments take already
         self._offsets = aligned_empty(size[0] * size[1] + 1, np.uint64)
         self._begin = self._end = 0  # supersegments that the buffers hold
-        self._arrays = {name: GrowingArray(item) for name, (_, item) in _ARRAYS.items()}
+        self._arrays = {name: aligned_empty((0, *item)) for name, (_, item) in _ARRAYS.items()}
         self._targets: dict[str, DeviceBuffer] = {}
         # Supersegments that a device's own buffers have room for
         self._largest = runtime.info.max_allocation // _LARGEST_ELEMENT
@@ -187,7 +187,7 @@ class GrowingLists(contextlib.AbstractContextManager["GrowingLists"]):
             return ListsOnDevice(runtime, self._offsets, n, buffers)
         runtime.download(self._starts, self._offsets)
         self._collect(n)
-        return Arrays(self._offsets, *(grown.finished(n) for grown in self._arrays.values()))
+        return Arrays(self._offsets, *(cut_to(array, n) for array in self._arrays.values()))
 
     def _make_room(self, begin: int, end: int) -> None:
         """Make buffers of the supersegments from ``begin``, those made so far, to ``end``."""
@@ -200,13 +200,13 @@ class GrowingLists(contextlib.AbstractContextManager["GrowingLists"]):
                     self._targets[name] = self._runtime.buffer((self._room, *item), name=what)
             self._begin, self._end = begin, begin + self._room
             return
-        for array in self._arrays.values():
-            array.reserve(end, self._most)
+        for name, array in self._arrays.items():
+            self._arrays[name] = with_room(array, end, self._most)
         begin -= begin % alignment  # so many elements are aligned as well
-        room = min(len(grown.array) for grown in self._arrays.values())
+        room = min(map(len, self._arrays.values()))
         self._begin, self._end = begin, max(end, min(room, begin + self._largest))
-        for name, grown in self._arrays.items():
-            part = grown.array[begin : self._end]
+        for name, array in self._arrays.items():
+            part = array[begin : self._end]
             target = self._runtime.result(part.shape, name=_ARRAYS[name][0], out=part)
             self._targets[name] = target
 
@@ -214,8 +214,8 @@ class GrowingLists(contextlib.AbstractContextManager["GrowingLists"]):
         """Wait until so many supersegments are in the host's arrays; in place, release buffers."""
         in_place = self._runtime.in_place_alignment is not None
         for name, target in self._targets.items():
-            self._arrays[name].reserve(made, self._most)
-            self._runtime.download(target, self._arrays[name].array[self._begin : made])
+            array = self._arrays[name] = with_room(self._arrays[name], made, self._most)
+            self._runtime.download(target, array[self._begin : made])
             if in_place:
                 target.release()
         if in_place:

@@ -124,7 +124,8 @@ class Records:
             "window_row": self.window.y0,
             "finest": self.finest,
             "reference_length": voxel,
-            "hidden_weight": options.hidden_weight,
+            # Of what V_O cannot see at all when neighbours are merged
+            "hidden_weight": 1 - np.cos(np.radians(options.view_cone)),
         }
         self.recording = {**numbers, "limit": slices.kept}
         self._budget = {**numbers, "limit": options.max_supersegments}

@@ -11,7 +11,7 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file.chunks import check_level
-from pyvista_vdi.io.vdi_file.reader import FileInfo
+from pyvista_vdi.io.vdi_file.reader import FileInfo, opened_file
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
@@ -25,10 +25,10 @@ def format_named(path: Any) -> FileFormat | None:
     return next((each for each in registry.formats() if name.endswith(each.suffix)), None)
 
 
-def format_of(path: Any) -> FileFormat | None:
+def format_of(path: Any) -> FileFormat:
     """Return the format in which a file is read: by its name, in a page by what it holds.
 
-    ``None`` if its name stands for none.
+    Our own, that of a VDI, if its name stands for none.
     """
     found = format_named(path)
     if found is not None and found.page:
@@ -36,13 +36,12 @@ def format_of(path: Any) -> FileFormat | None:
         for inside in registry.formats():
             if inside.head and page.begins_with(path, inside.head):
                 return inside
-    return found
+    return found or registry.core.formats[0]
 
 
 def holds(path: Any) -> str | None:
     """Return what a file is read as, ``"VDI"``, ``"series"`` or ``"set"``; ``None``: by no name."""
-    found = format_of(path)
-    return None if found is None else found.holds
+    return None if format_named(path) is None else format_of(path).holds
 
 
 def opened(path: str | os.PathLike[str]) -> BinaryIO:
@@ -51,7 +50,7 @@ def opened(path: str | os.PathLike[str]) -> BinaryIO:
     if found is not None and found.page:
         stream: BinaryIO = found.load().data_in(path)
         return stream
-    return Path(path).open("rb")
+    return opened_file(path)
 
 
 def write(
@@ -67,7 +66,7 @@ def write(
     ``options`` are those of the format, and of pages the look that a DeferredVDI begins with.
     """
     target = checked_target(path)
-    found = format_named(target) or _own()
+    found = format_named(target) or registry.core.formats[0]
     if isinstance(vdi, DeferredVDI) and not found.values:
         raise InvalidVDIError(
             f"{target.suffix} files hold colours, and a DeferredVDI keeps values: write "
@@ -84,7 +83,7 @@ def read(path: str | os.PathLike[str], *, progress: Progress | None = None, **op
 
     See :func:`pyvista_vdi.read`, which has the options and the errors.
     """
-    found = format_of(path) or _own()
+    found = format_of(path)
     _check_names("read", path, options, found.read_options)
     return found.load().read(path, progress=progress, **options)
 
@@ -94,7 +93,7 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
 
     VDIFileError is raised as by :func:`read`, but for damaged arrays.
     """
-    return (format_of(path) or _own()).load().read_info(path)  # type: ignore[no-any-return]
+    return format_of(path).load().read_info(path)  # type: ignore[no-any-return]
 
 
 def checked_target(path: str | os.PathLike[str]) -> Path:
@@ -113,7 +112,7 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
 
 def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]) -> None:
     """Raise InvalidArgumentError now if :func:`write` would refuse an option for this file."""
-    found = format_named(path) or _own()
+    found = format_named(path) or registry.core.formats[0]
     compressions = found.compressions
     of_compressed = ("compression", "level") if compressions else ()
     _check_names("written", path, options, (*of_compressed, *found.write_options))
@@ -122,11 +121,6 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
         one_of(compression, f"compression of {path}", compressions)
     check_level(options.get("level"))
     one_of(options.get("precision"), "precision", PRECISIONS, none=True)
-
-
-def _own() -> FileFormat:
-    """Return our own format, in which a file is read whose name stands for none."""
-    return next(registry.formats())
 
 
 def _check_names(what: str, path: Any, options: Mapping[str, Any], known: tuple[str, ...]) -> None:

@@ -90,7 +90,7 @@ def accuracy(image: Image, reference: Image) -> dict[str, float]:
 def check_plan(angles: Sequence[float], least: int = 1, **counts: int) -> None:
     """Refuse angles that are none, and numbers of repetitions that make no sense."""
     for name, count in counts.items():
-        Number(f"a whole number from {least} to 1000", least, 1000, whole=True, name=name)(count)
+        Number(low=least, high=1000, whole=True, name=name)(count)
     if not angles or not all(math.isfinite(a) for a in angles):
         raise InvalidArgumentError(f"angles must be one or more numbers of degrees; got {angles!r}")
 

@@ -21,7 +21,7 @@ from pyvista_vdi.measure.bench import Bench, Image, accuracy, take_turns
 from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.metrics import over_background
-from pyvista_vdi.model.standard_cases import ANGLES, WINDOW_SIZE
+from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.prepared import prepared_vdi
@@ -46,24 +46,22 @@ Images = dict[str, Image]
 def measure(
     volume: Volume,
     classification: Mapping[str, Any],
-    window_size: tuple[int, int] = WINDOW_SIZE,
+    window_size: tuple[int, int] = (1280, 720),
     *,
-    angles: Sequence[float] = ANGLES,
-    max_supersegments: int = 20,
-    precision: str = "exact",
-    sample_distance: float | None = None,
+    angles: Sequence[float] = (0.0, 5.0, 30.0),
     repeats: int = 3,
     vtk: bool = True,
     device: Any = None,
     name: str = "volume",
     progress: Callable[[float], object] | None = None,
+    **options: Any,
 ) -> tuple[dict[str, Any], VDI, dict[float, Images]]:
     """Render one volume in every way, compare the pictures and time the frames.
 
-    ``classification`` has arguments of :func:`pyvista_vdi.generate`. ``window_size`` is that of the
-    VDI and of all frames, ``angles`` are degrees of ``Azimuth`` from V_O, ``sample_distance`` is
-    the accuracy step, model units, and ``repeats`` are timed frames of each candidate and view;
-    with 0 nothing is timed.
+    ``classification`` has arguments of :func:`pyvista_vdi.generate`, ``options`` are those of
+    generation, of which ``sample_distance`` is the accuracy step. ``window_size`` is that of the
+    VDI and of all frames, ``angles`` are degrees of ``Azimuth`` from V_O, and ``repeats`` are timed
+    frames of each candidate and view; with 0 nothing is timed.
 
     Returns the figures, what was generated from V_O, and the pictures by angle and by the keys of
     :data:`NAMES`, float32 (H, W, 3 or 4) over black. Each of the figures' ``views`` has ``near``,
@@ -74,10 +72,10 @@ def measure(
     (looks,) = records_of(classification, "compare", Classification)
     done = Pieces(progress, 1 + len(angles))
     table = looks.transfer_function_of(volume)
-    more: dict[str, Any] = {"device": device, "vtk": vtk, "sample_distance": sample_distance}
+    asked = GenerationOptions(**options)
+    more: dict[str, Any] = {"device": device, "vtk": vtk, "sample_distance": asked.sample_distance}
     more["volume_property"] = looks.volume_property
     with closing(Bench(volume, table, window_size, **more)) as bench:
-        options: dict[str, Any] = {"max_supersegments": max_supersegments, "precision": precision}
         vdi = bench.generate(**options)
         made = take_turns({"vdi": partial(bench.generate, **options)}, repeats, warm_up=False)
         done()
@@ -108,7 +106,8 @@ def measure(
                 "dtype": str(volume.array.dtype),
                 "classification": looks.describe(),
                 "window_size": window_size,
-                **options,
+                "max_supersegments": asked.max_supersegments,
+                "precision": asked.precision,
                 "sample_distance": bench.step,
                 "repeats": repeats,
                 "camera": bench.view.to_dict(),
@@ -121,7 +120,7 @@ def measure(
                 "lists": vdi.counts.size,
                 "vdi_bytes": vdi.nbytes,
                 "device_bytes": prepared_vdi(bench.runtime, vdi).list_bytes,
-                "dense_bytes": vdi.counts.size * max_supersegments * 24,
+                "dense_bytes": vdi.counts.size * asked.max_supersegments * 24,
             },
             "generation_seconds": statistics.median(made["vdi"]) if repeats else None,
             "views": views,

@@ -72,13 +72,6 @@ def sweep(axes: Mapping[str, Sequence[Any]] | None = None) -> list[Setting]:
     return [{}, *({name: value} for name, values in chosen.items() for value in values)]
 
 
-def _check(setting: Setting) -> None:
-    """Refuse an unknown name, or a value out of its range."""
-    if not 0.05 <= (value := setting.get("lists", 1.0)) <= 8:
-        raise InvalidArgumentError(f"lists must be from 0.05 to 8; got {value!r}")
-    GenerationOptions(**{name: value for name, value in setting.items() if name != "lists"})
-
-
 @dataclass(frozen=True)
 class Point:
     """One setting's figures over all angles.
@@ -219,8 +212,10 @@ def measure_tradeoff(
             f"{size[0]} x {size[1]} pixels have no SSIM: {SSIM_WINDOW} or more are needed each way"
         )
     settings = sweep() if settings is None else settings
-    for setting in settings:
-        _check(setting)
+    for setting in settings:  # refuse an unknown name, or a value out of its range
+        if not 0.05 <= (lists := setting.get("lists", 1.0)) <= 8:
+            raise InvalidArgumentError(f"lists must be from 0.05 to 8; got {lists!r}")
+        GenerationOptions(**{name: value for name, value in setting.items() if name != "lists"})
     table = looks.transfer_function_of(volume)
     vtk = find_spec(BACKEND) is not None if vtk is None else vtk
     plan: dict[str, Any] = {"name": name, "window_size": size, "angles": list(angles)}
@@ -251,30 +246,27 @@ def _vtk_times(bench: Bench, plan: Mapping[str, Any]) -> dict[str, float]:
 
 def _point(bench: Bench, setting: Setting, plan: Mapping[str, Any]) -> Point:
     """Return the figures of a setting."""
-    options = {"sample_distance": 0.5, "precision": "exact", "lists": 1.0, **setting}
+    options = {"sample_distance": 0.5, "lists": 1.0, **setting}
     options["sample_distance"] *= bench.voxel
-    precision, share = options.pop("precision"), options.pop("lists")
+    share = options.pop("lists")
     width, height = (max(1, round(edge * share)) for edge in bench.size)
-    made: list[Any] = []
-
-    def generate() -> None:
-        made[:] = [bench.generate((width, height), **options).with_precision(precision)]
-
+    generate = partial(bench.generate, (width, height), **options)
+    vdi = generate()
     work: dict[str, Step] = {"volume": partial(bench.raycast, bench.view), "vdi": generate}
     generation = take_turns(work, plan["generations"])
     with tempfile.TemporaryDirectory() as folder:
-        size = made[0].save(Path(folder) / "vdi.vdi").stat().st_size
+        size = vdi.save(Path(folder) / "vdi.vdi").stat().st_size
     frames, ssims = {}, {}
     for angle in plan["angles"]:
         camera = bench.view.azimuth(angle)
-        draw = partial(bench.draw, made[0], camera)
+        draw = partial(bench.draw, vdi, camera)
         ssims[angle] = compare_images(draw(), bench.reference(camera)).ssim
         volume = partial(bench.raycast, camera, bench.voxel)
         taken = take_turns({"volume": volume, "vdi": draw}, plan["repeats"])
         frames[angle] = ratio(taken["vdi"], taken["volume"])
     costs = {
         "frame": statistics.geometric_mean(frames.values()),
-        "memory": prepared_vdi(bench.runtime, made[0]).list_bytes / 2**20,
+        "memory": prepared_vdi(bench.runtime, vdi).list_bytes / 2**20,
         "file": size / 2**20,
         "generation": ratio(generation["vdi"], generation["volume"]),
     }

@@ -7,7 +7,8 @@ such as ambient occlusion" (section 2). Computed is docs/dev/conventions.md, "Am
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,14 +20,11 @@ from pyvista_vdi.model.volume import Grid
 
 #: Steps that a radius is cut into at least.
 _LEAST_STEPS = 8
-#: Cells along an axis that are not made coarser, however large the radius is.
-_LEAST_CELLS = 32
-
 
 _CHECKS = {
-    "radius": Number("a positive length in model units", open_ended=True, none=True),
-    "strength": Number("from 0 to 1", 0, 1),
-    "directions": Number("a whole number from 12 to 4096", 12, 4096, whole=True),
+    "radius": Number("a length in model units", open_ended=True, none=True),
+    "strength": Number(high=1),
+    "directions": Number(low=12, high=4096, whole=True),
 }
 
 
@@ -65,8 +63,8 @@ class AmbientOcclusion:
 
     def __post_init__(self) -> None:
         for name, check in _CHECKS.items():
-            named = replace(check, name=f"the {name} of ambient occlusion")
-            object.__setattr__(self, name, named(getattr(self, name)))
+            kept = check(getattr(self, name), f"the {name} of ambient occlusion")
+            object.__setattr__(self, name, kept)
 
     @classmethod
     def from_any(cls, value: Any) -> AmbientOcclusion | None:
@@ -87,7 +85,6 @@ class AmbientOcclusion:
         return min(0.05 * volume.length if self.radius is None else self.radius, volume.length)
 
 
-@dataclass(frozen=True)
 class OcclusionGrid:
     """The grid on which the occlusion of a volume is computed, and the marches from its nodes.
 
@@ -100,40 +97,28 @@ class OcclusionGrid:
     3). ``margin``: cells that the marches reach beyond the nodes, along x, y and z, either way.
     ``padded``: nodes with the margin on both sides. ``samples`` along each edge of the box around a
     node whose mean opacity the node gets: half a voxel apart, as marches by default, in cells of
-    one or two voxels; then no more.
+    one or two voxels; then no more. ``nbytes``: on a device while the occlusion is computed; what
+    stays is the nodes' float32.
     """
 
-    cell: tuple[int, ...]
-    nodes: tuple[int, ...]
-    step: float
-    offsets: NDArray[np.float64]
-    margin: tuple[int, ...]
-    padded: tuple[int, ...]
-    samples: tuple[int, ...]
-
-    @classmethod
-    def of(cls, volume: Grid, occlusion: AmbientOcclusion) -> OcclusionGrid:
-        """Return the grid for a volume."""
+    def __init__(self, volume: Grid, occlusion: AmbientOcclusion) -> None:
         radius = occlusion.radius_in(volume)
         spacing, points = np.array(volume.spacing), np.array(volume.dimensions)
         wanted = np.floor(radius / _LEAST_STEPS / spacing * (1 + 1e-9))
-        coarsest = np.maximum((points - 1) // _LEAST_CELLS, 1)
+        coarsest = np.maximum((points - 1) // 32, 1)  # 32 cells along an axis are kept
         cell = np.clip(wanted, 1, coarsest).astype(int)
         steps = max(_LEAST_STEPS, math.ceil(radius / (cell * spacing).min() * (1 - 1e-9)))
         to_cells = np.linalg.inv(volume.direction * (spacing * cell))
-        along = (np.arange(steps) + 0.5) * (radius / steps)
+        self.step = radius / steps
+        along = (np.arange(steps) + 0.5) * self.step
         directions = spread_directions(occlusion.directions) @ to_cells.T
         nodes = -(-(points - 1) // cell) + 1
-        offsets = directions[:, None, :] * along[None, :, None]
-        margin = np.floor(np.abs(offsets).max(axis=(0, 1))).astype(int) + 1
+        self.offsets = directions[:, None, :] * along[None, :, None]
+        margin = np.floor(np.abs(self.offsets).max(axis=(0, 1))).astype(int) + 1
         sizes = (cell, nodes, margin, nodes + 2 * margin, np.minimum(2 * cell, 4))
-        cells, total, *others = (tuple(each.tolist()) for each in sizes)
-        return cls(cells, total, radius / steps, offsets, *others)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes on a device while the occlusion is computed; what stays is the nodes' float32."""
-        return 4 * (math.prod(self.padded) + math.prod(self.nodes))
+        lists: Iterator[tuple[int, ...]] = (tuple(each.tolist()) for each in sizes)
+        self.cell, self.nodes, self.margin, self.padded, self.samples = lists
+        self.nbytes = 4 * (math.prod(self.padded) + math.prod(self.nodes))
 
 
 def spread_directions(n: int) -> NDArray[np.float64]:

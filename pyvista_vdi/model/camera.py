@@ -103,10 +103,7 @@ class Camera:
                 f"got {given!r}"
             )
         # Scale-free: the determinant against the product of the column lengths (Hadamard's bound)
-        columns = np.abs(matrix[:3, :3]).max(axis=0)  # first, because squares may overflow
-        if columns.all():
-            columns *= np.linalg.norm(matrix[:3, :3] / columns, axis=0)
-        if not columns.all() or abs(np.linalg.det(matrix[:3, :3] / columns)) < 1e-12:
+        if abs(np.linalg.det(unit(matrix[:3, :3].T))) < 1e-12:
             raise InvalidCameraError(
                 f"model_transform cannot be inverted: it flattens space; got {given!r}"
             )
@@ -235,8 +232,7 @@ class Camera:
         # By a power of two, which rounds nothing: squares may overflow
         forward = np.ldexp(forward, -np.frexp(np.abs(forward).max())[1])
         forward = forward / math.sqrt(forward @ forward)
-        up = np.asarray(self.view_up)
-        right = _cross(forward, _unit(up)) if up.any() else np.zeros(3)
+        right = _cross(forward, unit(np.array(self.view_up)))
         # sin of the angle between them; below 1e-12 float64 cannot tell which way is right
         if math.sqrt(right @ right) < 1e-12:
             raise InvalidCameraError(
@@ -302,12 +298,9 @@ class Camera:
         float64 (3, 3) each. The ray through ``(u, v)`` is ``P(t) = [1, u, v] @ origin +
         t [1, u, v] @ direction``; its direction has Z = 1, so t is view depth.
         """
-        half_width, half_height = self.half_extent(window_size)
-        c_x, c_y = self.window_center
-        slope = np.array(
-            [[c_x * half_width, c_y * half_height, 0.0], [half_width, 0, 0], [0, half_height, 0]]
-        )
-        forward = np.zeros((3, 3))
+        half = self.half_extent(window_size)
+        slope, forward = np.zeros((3, 3)), np.zeros((3, 3))
+        slope[:, :2] = np.vstack([np.multiply(half, self.window_center), np.diag(half)])
         forward[0, 2] = 1.0
         if self.parallel_projection:
             return slope, forward
@@ -315,7 +308,7 @@ class Camera:
 
     def _turned(self, axis: Matrix, degrees: float) -> Camera:
         """Rotate the eye about ``axis`` through the focal point (Rodrigues' formula)."""
-        axis, angle = _unit(axis), math.radians(as_float(degrees))
+        axis, angle = unit(axis), math.radians(as_float(degrees))
         if not math.isfinite(angle):
             raise InvalidCameraError(f"a view is turned by a finite angle; got {degrees!r}")
         arm = np.subtract(self.position, self.focal_point)
@@ -324,10 +317,12 @@ class Camera:
         return self.replace(position=np.asarray(self.focal_point) + turned)
 
 
-def _unit(vector: Matrix) -> Matrix:
+def unit(vectors: Matrix) -> Matrix:
+    """Return vectors, (..., n), at length one; zeros where they are zero."""
     # Scaled first: the square of a component may overflow or vanish though the vector does not
-    vector = vector / np.abs(vector).max()
-    return np.asarray(vector / math.sqrt(vector @ vector))
+    largest = np.abs(vectors).max(axis=-1, keepdims=True)
+    scaled = vectors / np.where(largest > 0, largest, 1.0)
+    return np.asarray(scaled / np.maximum(np.linalg.norm(scaled, axis=-1, keepdims=True), 1.0))
 
 
 def _cross(a: Matrix, b: Matrix) -> Matrix:

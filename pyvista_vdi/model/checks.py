@@ -46,27 +46,33 @@ def as_flag(value: Any, name: str) -> bool:
 class Number:
     """A check of a number from ``low`` to ``high``, finite; without these if ``open_ended``.
 
-    ``wanted`` says so in an error. ``whole``: whether it is a whole number; ``none``: whether None
-    passes.
+    ``of`` says in an error what it is a number of. ``whole``: whether it is a whole number;
+    ``none``: whether None passes.
     """
 
-    wanted: str
-    low: float = 0.0
+    of: str = ""
+    low: float = 0
     high: float = math.inf
     whole: bool = False
     open_ended: bool = False
     name: str = ""
     none: bool = False
 
-    def __call__(self, value: Any) -> Any:
-        """Return a value as a float or an int; raises InvalidArgumentError."""
+    def __call__(self, value: Any, name: str = "") -> Any:
+        """Return a value as a float or an int; raises InvalidArgumentError, which names it."""
         if self.none and value is None:
             return None
         number = as_whole(value) if self.whole else as_number(value)
         at_end = number in (self.low, self.high) and self.open_ended
         if not self.low <= number <= self.high or number == math.inf or at_end:
+            wanted = self.of or ("a whole number" if self.whole else "a finite number")
+            if self.high < math.inf:
+                ends = " between {} and {}" if self.open_ended else " from {} to {}"
+                wanted += ends.format(self.low, self.high)
+            elif self.low > -math.inf:
+                wanted += f" above {self.low}" if self.open_ended else f", {self.low} or above"
             error = InvalidArgumentTypeError if math.isnan(number) else InvalidArgumentError
-            raise error(f"{self.name} must be {self.wanted}; got {value!r}")
+            raise error(f"{name or self.name} must be {wanted}; got {value!r}")
         return int(number) if self.whole else number
 
 
@@ -89,10 +95,11 @@ def suggestion(name: str, known: Sequence[str], cutoff: float = 0.6) -> str:
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
 
 
-def check_callback(function: Any) -> None:
-    """Raise InvalidArgumentTypeError if ``progress`` is neither a function nor ``None``."""
+def check_callback(function: Any) -> Any:
+    """Return ``progress``; InvalidArgumentTypeError if it is neither a function nor ``None``."""
     if function is not None and not callable(function):
         raise InvalidArgumentTypeError(f"progress must be a function; got {function!r}")
+    return function
 
 
 def as_range(values: Any) -> tuple[float, float]:

@@ -32,7 +32,26 @@ _PACKING = ("scale_factor", "add_offset", "_Unsigned")
 _MISSING, _NAN = ("_FillValue", "missing_value"), ("nan", "[nan]", "AAAAAAAA+H8=")
 
 
-class ChunkedArray:
+class Reopened:
+    """Has an ``array``; one of an HDF5 file is pickled as its place, and opened again."""
+
+    array: Any
+
+    def __getstate__(self) -> dict[str, Any]:
+        array = self.array
+        if library_of(array) == "h5py":
+            array = os.path.abspath(array.file.filename), array.name  # noqa: PTH100 - no links
+        return {**self.__dict__, "array": array}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        array = state["array"]
+        if isinstance(array, tuple):
+            path, name = array
+            array = importlib.import_module("h5py").File(path, "r")[name]
+        self.__dict__.update(state, array=array)
+
+
+class ChunkedArray(Reopened):
     """A three-dimensional array in chunks, of which parts are read as NumPy arrays.
 
     ``source``: whatever has ``shape``, ``dtype``, ``chunks`` and is indexed by slices. ``index``:
@@ -41,12 +60,12 @@ class ChunkedArray:
 
     ``shape``, ``dtype``, ``ndim``, ``size``, ``nbytes``: as of a NumPy array (z, y, x). ``chunks``:
     points of a chunk along z, y and x, some of which may have fewer. ``source``: what messages call
-    it. ``lazy``: the array as Dask has it, if it does.
+    it. ``lazy``: whether Dask computes it.
     """
 
     ndim = 3
 
-    def __init__(self, source: Any, *, index: Sequence[int | slice] | None = None) -> None:
+    def __init__(self, source: Any, *, index: Sequence[int | slice] = (slice(None),) * 3) -> None:
         told = getattr(source, "attrs", {})
         said = [name for name in _PACKING if name in told]
         said += [name for name in _MISSING if name in told and str(told[name]) not in _NAN]
@@ -55,14 +74,10 @@ class ChunkedArray:
                 f"the array's values are packed ({', '.join(said)}): open it by xarray, which "
                 'unpacks them, and give pyvista_vdi.Volume(dataset["name"].data)'
             )
-        self.lazy = source if library_of(source) == "dask" else None
-        self._array = source
-        self._index = tuple(index) if index is not None else (slice(None),) * 3
-        if self.lazy is not None and index is not None:
-            self.lazy = self._array = source[self._index]
-            self._index = (slice(None),) * 3
+        self.array, self._index = source, tuple(index)
+        self.lazy = library_of(source) == "dask"
         kept = [k for k, at in enumerate(self._index) if isinstance(at, slice)]
-        if len(kept) != 3 or len(self._index) != len(self._array.shape):
+        if len(kept) != 3 or len(self._index) != len(source.shape):
             raise InvalidVolumeError(
                 f"a volume is a three-dimensional array; got shape {tuple(source.shape)}: choose "
                 "time and channel (pyvista_vdi.read_volume does), index the array, or load "
@@ -71,23 +86,23 @@ class ChunkedArray:
         file = _file_of(source)
         self.source = f"the {library_of(source)} array of shape {tuple(source.shape)}"
         self.source += f" in {file}" if file else ""
-        if any(math.isnan(n) for n in self._array.shape):
+        if any(math.isnan(n) for n in source.shape):
             raise InvalidVolumeError(
                 f"{self.source} does not know how long its chunks are: call "
                 "array.compute_chunk_sizes() first, which computes it for that"
             )
-        z, y, x = (int(self._array.shape[k]) for k in kept)
+        z, y, x = (int(source.shape[k]) for k in kept)
         self.shape: tuple[int, int, int] = (z, y, x)
         self.dtype = voxel_type(source.dtype)
         self.size = math.prod(self.shape)
         self.nbytes = self.size * self.dtype.itemsize
         # Dask has the lengths of all chunks along an axis
-        chunks: Any = getattr(self._array, "chunks", None) or (_CHUNK_POINTS,) * len(self._index)
+        chunks: Any = source.chunks or (_CHUNK_POINTS,) * len(self._index)
         self.chunks = tuple(
             min(int(np.max(chunks[k])), n) for k, n in zip(kept, self.shape, strict=True)
         )
-        if self.lazy is not None and self.dtype != source.dtype:
-            self.lazy = self._array = self.lazy.map_blocks(held, dtype=self.dtype)
+        if self.lazy and self.dtype != source.dtype:
+            self.array = source.map_blocks(held, dtype=self.dtype)
 
     def __getitem__(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Read a part: three slices of step 1 (z, y, x)."""
@@ -97,9 +112,7 @@ class ChunkedArray:
         parts = iter(box)
         at = tuple(next(parts) if isinstance(k, slice) else k for k in self._index)
         try:
-            found = self._array[at]
-            if self.lazy is not None:
-                return np.ascontiguousarray(found.compute())
+            found = np.asarray(self.array[at])  # which Dask computes
         except (MemoryError, VDIError):
             raise
         except Exception as error:  # each library, and each function of Dask's, has its own
@@ -108,7 +121,7 @@ class ChunkedArray:
             raise InvalidVolumeError(
                 f"{self.source} cannot be read at its points [{points}] "
                 f"({type(error).__name__}: {error}): "
-                f"{remedy if self.lazy is None else 'what computes them fails'}"
+                f"{'what computes them fails' if self.lazy else remedy}"
             ) from error
         return held(found)
 
@@ -132,27 +145,20 @@ class ChunkedArray:
     @property
     def files(self) -> list[Path]:
         """The files or folders that it is read from, those of a Dask graph's arrays among them."""
-        layers = getattr(getattr(self.lazy, "dask", None), "layers", {}).values()
+        layers = getattr(getattr(self.array, "dask", None), "layers", {}).values()
         arrays = [value for layer in layers if len(layer) == 1 for value in layer.values()]
-        return [path for each in (self._array, *arrays) if (path := _file_of(each)) is not None]
+        return [path for each in (self.array, *arrays) if (path := _file_of(each)) is not None]
 
     @functools.cached_property
     def ends(self) -> tuple[float, float]:
         """The least and the largest scalar, NaN left out; all chunks are read for it, once."""
-        counts = [-(-n // chunk) for n, chunk in zip(self.shape, self.chunks, strict=True)]
-        low, high = [np.nan], [np.nan]
-        for at in itertools.product(*map(range, counts)):
-            pairs = zip(at, self.chunks, strict=True)
-            part = self[tuple(slice(k * n, (k + 1) * n) for k, n in pairs)]
+        dz, dy, dx = self.chunks
+        low, high = [], []
+        for z, y, x in itertools.product(*map(range, (0, 0, 0), self.shape, self.chunks)):
+            part = self[z : z + dz, y : y + dy, x : x + dx]
             low.append(np.fmin.reduce(part, axis=None))
             high.append(np.fmax.reduce(part, axis=None))
         return float(np.fmin.reduce(low)), float(np.fmax.reduce(high))
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_array": closed(self._array)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state, _array=opened(state["_array"]))
 
 
 def library_of(thing: Any) -> str:
@@ -168,21 +174,6 @@ def _file_of(array: Any) -> Path | None:
     store = getattr(array, "store", None)
     root = Path(str(getattr(store, "root", None) or getattr(store, "path", None)))
     return root / array.path if library_of(array) == "zarr" and root.is_dir() else None
-
-
-def closed(array: Any) -> Any:
-    """Return what is pickled in place of an array: an HDF5 file's is opened again."""
-    if library_of(array) == "h5py":
-        return os.path.abspath(array.file.filename), array.name  # noqa: PTH100 - no links
-    return array
-
-
-def opened(array: Any) -> Any:
-    """Return the array in whose place another was pickled."""
-    if not isinstance(array, tuple):
-        return array
-    path, name = array
-    return importlib.import_module("h5py").File(path, "r")[name]
 
 
 def voxel_type(dtype: Any) -> np.dtype[Any]:

@@ -1,7 +1,6 @@
 """Several VDIs of one scene, shown as one: what extensions derive series and sets from."""
 
 import os
-from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,7 +11,6 @@ from pyvista_vdi.model.vdi import VDI, Lists
 
 #: Steps per second at which those of several times are played.
 RATE = 24.0
-
 
 _Collection = TypeVar("_Collection", bound="VDICollection")
 
@@ -25,15 +23,14 @@ class VDICollection(Sequence[VDI]):
     """
 
     times: tuple[float, ...] | None = None
-
-    @property
-    @abstractmethod
-    def camera(self) -> Camera:
-        """The view to begin with."""
-
-    @abstractmethod
-    def nearest(self, at: Any) -> int:
-        """Return the index of the VDI that is nearest to a time, or to a view."""
+    #: The view to begin with.
+    camera: Camera
+    #: Place of the class of what a mapper draws of it.
+    drawn_by: str
+    #: Returns the index of the VDI that is nearest to a time, or to a view.
+    nearest: Callable[[Any], int]
+    #: Returns it with what a function makes of each VDI, when that is asked for.
+    _mapped: Callable[[Callable[[VDI], VDI]], Any]
 
     def _place(self, index: int, what: str) -> int:
         """Return an index counted from the first; IndexError if there is no such VDI."""
@@ -54,10 +51,6 @@ class VDICollection(Sequence[VDI]):
         VDI is made when it is asked for. InvalidVDIError if they have colours.
         """
         return registry.method("DeferredVDI.classified")(self, look)  # type: ignore[no-any-return]
-
-    def _mapped(self: _Collection, function: Callable[[VDI], VDI]) -> _Collection:
-        """Return it with what a function makes of each VDI, when that is asked for."""
-        raise NotImplementedError
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write all in one file that `pyvista_vdi.read` opens, or a page, whole or not at all.

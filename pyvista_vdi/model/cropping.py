@@ -21,7 +21,8 @@ PRESETS = {
     "inverted_cross": 0x7BE8BEF,
 }
 
-_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+#: Normals of planes across the axes of a frame.
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Cropping:
 
     planes: tuple[float, float, float, float, float, float]
     regions: int = PRESETS["subvolume"]
-    normals: tuple[tuple[float, float, float], ...] = _AXES
+    normals: tuple[tuple[float, float, float], ...] = AXES
 
     def __post_init__(self) -> None:
         planes, normals = as_floats(self.planes), as_floats(self.normals)
@@ -96,7 +97,7 @@ class Cropping:
             if not cropping.GetCropping():
                 return None
             planes, image = cropping.GetCroppingRegionPlanes(), cropping.GetDataSetInput()
-            normals: Any = _AXES
+            normals: Any = AXES
             matrix = image.GetDirectionMatrix() if hasattr(image, "GetDirectionMatrix") else None
             if matrix is not None and not matrix.IsIdentity():
                 # VTK's GPU mapper puts the planes' places into the image's bounds, takes each as a
@@ -107,10 +108,7 @@ class Cropping:
                 planes = np.clip(np.reshape(planes, (3, 2)), low, high) * np.diag(normals)[:, None]
                 planes = planes.ravel()
             return cls(planes, cropping.GetCroppingRegionFlags(), normals)
-        try:
-            parts = list(cropping)
-        except TypeError:
-            parts = [cropping]
+        parts = list(cropping) if np.iterable(cropping) else []
         return cls(*parts) if len(parts) == 2 else cls(cropping)
 
     def parts_of_ray(
@@ -120,7 +118,7 @@ class Cropping:
 
         Of P(t) = origin + t direction in the model frame, float64 (3,), from first to last.
         """
-        planes = np.maximum.accumulate(np.reshape(np.asarray(self.planes), (3, 2)), axis=1)
+        planes = np.maximum.accumulate(np.reshape(self.planes, (3, 2)), axis=1)
         origin, direction = (np.asarray(self.normals) @ along for along in (origin, direction))
         with np.errstate(divide="ignore", invalid="ignore"):  # a plane that is never reached
             t = ((planes - origin[:, None]) / direction[:, None]).ravel()
@@ -135,30 +133,3 @@ class Cropping:
         box = np.reshape(np.asarray(bounds, dtype=np.float64), (3, 2))
         ends = np.asarray(self.normals)[:, :, None] * box  # normal, axis, low or high
         return np.stack([ends.min(axis=2).sum(axis=1), ends.max(axis=2).sum(axis=1)], axis=1)
-
-    def within(
-        self, bounds: Sequence[float]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-        """Return what is kept of a box of the model frame, outside of which nothing counts.
-
-        Low and high plane of each axis, moved into the box, float64 (3, 2); and between which
-        places along each normal all is kept, (3, 2), NaN if that is nothing, or ``None`` where it
-        takes the regions to say it.
-        """
-        box = self.reach(bounds)
-        planes = np.reshape(np.asarray(self.planes), (3, 2))
-        planes = np.maximum.accumulate(planes, axis=1)  # nothing is between a low one and less
-        # Within the bounds, so that a plane far away costs float32 nothing
-        cuts = np.clip(planes, box[:, :1], box[:, 1:])
-        borders = np.column_stack([box[:, 0], cuts, box[:, 1]])
-        x, y, z = np.diff(borders, axis=1) > 0
-        there = z[:, None, None] & y[:, None] & x
-        kept = (self.regions >> np.arange(27).reshape(3, 3, 3) & 1) == 1
-        places = np.argwhere(kept & there)[:, ::-1]
-        if not len(places):
-            return cuts, np.full((3, 2), np.nan)
-        first, last = places.min(axis=0), places.max(axis=0) + 1
-        covered = tuple(slice(a, b) for a, b in zip(first[::-1], last[::-1], strict=True))
-        if (there & ~kept)[covered].any():
-            return cuts, None
-        return cuts, np.stack([borders[range(3), first], borders[range(3), last]], axis=1)

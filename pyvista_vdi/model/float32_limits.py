@@ -1,20 +1,20 @@
-"""What float32 holds, and from where on another arithmetic takes over (docs/dev/numerics.md)."""
+"""Borders beyond which another arithmetic takes over, or a scene is refused.
+
+They are derived in docs/dev/numerics.md, "Two arithmetics".
+"""
 
 import numpy as np
 from numpy.typing import DTypeLike
 
 #: Media on a ray from which on opacity is summed up from 0, and from which on sums carry what
-#: each addition rounds off. Counted down from 1, transmittance loses up to 2^-25 in each addition:
-#: 3e-5 in 1024. Counted up, an opacity of 1/8 loses as much in 8192.
+#: each addition rounds off.
 MANY_MEDIA, VERY_MANY_MEDIA = 1024, 8192
 
-#: Most steps across a volume. Where samples of a homogeneous medium become one supersegment, a sum
-#: is rounded once in 128 steps: 2^19 / 128 roundings of 2^-25 change an opacity by 5e-5 at most.
+#: Most steps across a volume.
 MOST_STEPS = 2**19
 
 #: Most times its transfer function's range that a scalar may be, when the kernels read it as it
-#: is: interpolation rounds it 9 times (3 stages of 3), by 2^-24 of its size, 3.4e-5 of the range
-#: in all. A nearest point's scalar is rounded once.
+#: is: interpolation rounds it 9 times (3 stages of 3), a nearest point's scalar is rounded once.
 _MOST_RANGES = {"linear": 64.0, "nearest": 576.0}
 
 #: Scalar ranges, and sizes of scalars, that leave their differences' products normal numbers.
@@ -24,21 +24,10 @@ _SMALLEST_RANGE, _LARGEST_SCALAR = 2.0**-100, 2.0**100
 LARGEST_VOXEL = 2.0**126
 
 #: Grid coordinates up to which positions on a ray are computed in float32 alone, from where the
-#: rays are formed: their 16 roundings are a 4000th of a voxel at 256 and a 1000th at 1000. Between,
-#: it is so up to four times the points of the longest axis: what is not much longer than wide never
-#: reaches that, and its positions are rounded nearly as much within it.
+#: rays are formed: the last times the points of the longest axis, but within the first two.
 NEAR_ENTRY, FAR_ENTRY, ENTRY_PER_POINT = 256.0, 2048.0, 4.0
 
-#: Most times the thickness of what a VDI's lists hold that their depths may be, in the sense of the
-#: depth coordinate's rounding, for float32 alone: 14 roundings (12 of a ray's coordinate, 2 of a
-#: face's; ``reference.render_range``) of so many thicknesses change an opacity by 1/e of that,
-#: 3.9e-5.
-MOST_DEPTHS = 128.0
-
-#: Thickness, in extents of the bounds' depths, below which nothing tells what a ray crosses.
-THINNEST_LIST = 2.0**-23
-
-#: Largest specular power of a cosine as it is: 8 roundings, near 1, change its power by 4.8e-5.
+#: Largest specular power of a cosine as it is.
 LARGEST_POWER = 100.0
 
 #: Optical depths of one step, through any opacity of at least 2^-24, whose sums float32 holds.
@@ -70,9 +59,10 @@ def lists_are_far(depth: float, thickness: float, extent: float) -> bool:
     """Whether depths in lists need be relative to each ray (``-D DOUBLE_FLOAT_RAYS``).
 
     ``depth`` is the largest that is rounded, ``thickness`` that of what the thickest list holds,
-    from its first front to its last back, and ``extent`` that of the bounds; world units.
+    from its first front to its last back, and ``extent`` that of the bounds; world units. Below
+    2^-23 extents nothing tells what a ray crosses.
     """
-    return extent * THINNEST_LIST < thickness < depth / MOST_DEPTHS
+    return extent * 2.0**-23 < thickness < depth / 128
 
 
 def held_unit_distance(unit_distance: float, sample_distance: float) -> float:

@@ -13,7 +13,7 @@ from pyvista_vdi.errors import DeviceMemoryError
 HOST_ALIGNMENT = 4096
 
 
-def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike = np.float32) -> NDArray[Any]:
     """Return an uninitialised C-contiguous array that a CPU device can use without a copy."""
     shape = (shape,) if isinstance(shape, int) else tuple(shape)
     nbytes = math.prod(shape) * np.dtype(dtype).itemsize
@@ -26,39 +26,28 @@ def aligned_empty(shape: int | tuple[int, ...], dtype: DTypeLike) -> NDArray[Any
     return raw[start : start + nbytes].view(dtype).reshape(shape)
 
 
-class GrowingArray:
-    """A float32 array whose number of elements is known when the last one is written.
+def with_room(array: NDArray[Any], n: int, most: int) -> NDArray[Any]:
+    """Return an aligned array with room for at least n elements (MemoryError), itself if it has it.
 
     Systems take memory as it is written, so room for the most that there may be costs nothing. Only
-    where that is refused do its elements, of the shape ``item``, move when it grows. ``array`` are
-    those that there is room for, to be written, until another method is called.
+    where that is refused do elements move more than once.
     """
+    if n <= len(array):
+        return array
+    try:
+        larger = aligned_empty((most, *array.shape[1:]), array.dtype)
+    except MemoryError:
+        larger = aligned_empty((2 * n, *array.shape[1:]), array.dtype)
+    larger[: len(array)] = array
+    return larger
 
-    def __init__(self, item: tuple[int, ...] = ()) -> None:
-        self._item, self.array = item, aligned_empty((0, *item), np.float32)
 
-    def reserve(self, n: int, most: int) -> None:
-        """Make room for at least n elements (MemoryError), for the most if it can be had."""
-        for room in (most, 2 * n, n):
-            if n <= len(self.array):
-                return
-            try:
-                larger = aligned_empty((room, *self._item), np.float32)
-            except MemoryError:
-                if room == n:
-                    raise
-                continue
-            larger[: len(self.array)] = self.array
-            self.array = larger
-
-    def finished(self, n: int) -> NDArray[Any]:
-        """Return the first n elements; the room for others is given back."""
-        raw: Any = self.array.base
-        start = self.array.ctypes.data - raw.ctypes.data
-        end = start + self.array[:n].nbytes
-        raw.resize(end, refcheck=False)
-        self.array = raw[start:end].view(np.float32).reshape(n, *self._item)
-        return self.array
+def cut_to(array: NDArray[Any], n: int) -> NDArray[Any]:
+    """Return an aligned array's first n elements in its place: the room for others is released."""
+    raw: Any = array.base
+    start = array.ctypes.data - raw.ctypes.data
+    raw.resize(start + array[:n].nbytes, refcheck=False)
+    return raw[start:].view(array.dtype).reshape(n, *array.shape[1:])
 
 
 def require_host_memory(nbytes: int, what: str, remedy: str, *, free: bool = False) -> None:

@@ -1,6 +1,5 @@
 """What a user calls a volume or a VDI, VTK's objects and PyVista's among it, as ours."""
 
-import functools
 import os
 import reprlib
 import weakref
@@ -13,9 +12,9 @@ from pyvista_vdi.errors import InvalidVDIError, InvalidVolumeError, InvalidVolum
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.volume import Volume
 
-#: The volume that was made of each VTK image last, by the image's id: what it was made of, which
-#: changes with the image, and the image, whose end is its end.
-_kept: dict[int, tuple[tuple[Any, ...], Volume, weakref.ref[Any]]] = {}
+#: What was made of each VTK image last, by the image's id, until the image's end: what it was made
+#: of, which changes with the image, and the volume.
+_kept: dict[int, tuple[tuple[Any, ...], Volume]] = {}
 
 
 def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Volume:
@@ -46,8 +45,9 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
         if kept is not None and kept[0] == made_of:
             return kept[1]
         made = Volume.from_vtk(volume, scalars, preference)
-        forget = functools.partial(_kept.pop, id(volume), None)
-        _kept[id(volume)] = made_of, made, weakref.ref(volume, lambda _: forget())
+        if kept is None:
+            weakref.finalize(volume, _kept.pop, id(volume)).atexit = False
+        _kept[id(volume)] = made_of, made
         return made
     if isinstance(volume, np.ndarray):
         raise InvalidVolumeError(
@@ -56,7 +56,7 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
         )
     raise InvalidVolumeTypeError(
         "expected a pyvista.ImageData, a vtkImageData, a pyvista_vdi.Volume or a file's path; "
-        f"got {_described(volume)}"
+        f"got {type(volume).__name__}"
     )
 
 
@@ -70,13 +70,7 @@ def as_vdi(vdi: Any) -> VDI:
         )
     if hasattr(vdi, "GetClassName"):
         return as_vdi(registry.method("VDI.from_image")(vdi))
-    hint = ": read it by pyvista_vdi.read(path)" if isinstance(vdi, str | os.PathLike) else ""
-    raise InvalidVDIError(
-        f"expected a VDI or its VTK form (a vtkImageData); got {_described(vdi)}{hint}"
-    )
-
-
-def _described(thing: object) -> str:
-    if isinstance(thing, str | os.PathLike):
-        return f"the path {os.fspath(thing)!r}"
-    return type(thing).__name__
+    got = type(vdi).__name__
+    if isinstance(vdi, str | os.PathLike):
+        got = f"the path {os.fspath(vdi)!r}: read it by pyvista_vdi.read(path)"
+    raise InvalidVDIError(f"expected a VDI or its VTK form (a vtkImageData); got {got}")

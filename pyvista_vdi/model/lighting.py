@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.model.camera import Camera
+from pyvista_vdi.model.camera import Camera, Vector, unit
 from pyvista_vdi.model.checks import Number, as_flag, as_vector, one_of
-
-Vector: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ class Shading:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).copy().items():
-            object.__setattr__(self, name, Number("0 or above", name=name)(value))
+            object.__setattr__(self, name, Number()(value, name))
 
 
 @dataclass(frozen=True)
@@ -87,9 +85,9 @@ class Light:
         put = object.__setattr__
         for name in ("position", "focal_point", "ambient", "diffuse", "specular", "attenuation"):
             put(self, name, as_vector(getattr(self, name), f"a light's {name}"))
-        finite = Number("a finite number", -math.inf, open_ended=True)
+        finite = Number(low=-math.inf, open_ended=True)
         for name in ("cone_angle", "exponent", "intensity"):
-            put(self, name, replace(finite, name=f"a light's {name}")(getattr(self, name)))
+            put(self, name, finite(getattr(self, name), f"a light's {name}"))
         put(self, "positional", as_flag(self.positional, "a light's positional"))
         if self.kind == "headlight":  # wherever the eye is, it is the same light
             put(self, "position", Light.position)
@@ -118,19 +116,17 @@ class Light:
         names += ["Positional", "AttenuationValues", "ConeAngle", "Exponent", "Intensity"]
         return cls(kind, *(getattr(light, f"Get{name}")() for name in names))
 
-    def in_world(self, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return position and unit direction of travel in world coordinates, float64 (3,) each."""
-        position, target = np.array(self.position), np.array(self.focal_point)
+    def in_view(self, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return position and unit direction of travel in view space, float64 (3,) each."""
         if self.kind == "headlight":
-            position, target = np.array(camera.position), np.array(camera.focal_point)
-        elif self.kind == "camera":
-            right, up, forward = camera.axes
-            centre = np.array(camera.focal_point)
-            distance = np.linalg.norm(centre - camera.position)
-            axes = distance * np.array([right, up, -forward])
-            position, target = centre + position @ axes, centre + target @ axes
-        direction = target - position
-        return position, direction / np.linalg.norm(direction)
+            return np.zeros(3), np.array([0.0, 0.0, 1.0])
+        ends = np.array([self.position, self.focal_point])
+        if self.kind == "scene":
+            ends = (ends - camera.position) @ camera.axes.T
+        else:
+            distance = np.linalg.norm(np.subtract(camera.focal_point, camera.position))
+            ends = distance * ((0, 0, 1) + ends * (1, 1, -1))
+        return ends[0], unit(ends[1] - ends[0])
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 ``docs/dev/conventions.md`` ("Packed supersegments") has the bits and what they lose.
 """
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -39,12 +40,6 @@ _LEAST_TAU = np.float32(2.0**-19)
 
 #: Steps of red, green and blue, and where the bits of each begin.
 _COLOR_STEPS, _COLOR_BITS = 255, (8, 16, 24)
-
-
-def lengths_of_lists(offsets: NDArray[np.uint64]) -> NDArray[np.int64]:
-    """Return the supersegments of each list, int64 (W * H,)."""
-    starts = offsets.view(np.int64)
-    return starts[1:] - starts[:-1]
 
 
 class Arrays(NamedTuple):
@@ -102,10 +97,10 @@ class Packed8:
 
     def arrays(self) -> Arrays:
         """Return the values that it stands for."""
-        n, counts = len(self.words), lengths_of_lists(self.offsets)
+        n, counts = len(self.words), np.diff(self.offsets).astype(np.int64)
         front, back, tau = (aligned_empty(n, np.float32) for _ in range(3))
         color, bits_of_color = aligned_empty((n, 3), np.float32), np.array(_COLOR_BITS, np.uint32)
-        for lists, part in _pieces(counts):
+        for lists, part in _pieces(self.offsets):
             *faces, tau_codes, colors = self.codes(part)
             own = np.repeat(np.arange(lists.start, lists.stop), counts[lists])
             front[part], back[part] = (self.depths(own, face) for face in faces)
@@ -124,7 +119,7 @@ class Packed8:
 
 def packing_of(arrays: Arrays, nearest: float) -> Packed8:
     """Return supersegments in 8 bytes each; ``nearest`` is the least depth in front of the eye."""
-    counts, n = lengths_of_lists(arrays.offsets), len(arrays.front)
+    counts, n = np.diff(arrays.offsets).astype(np.int64), len(arrays.front)
     if counts.max() > DEPTH_CODES:
         raise InvalidArgumentError(
             f"a list of {counts.max()} supersegments cannot be packed into 8 bytes each: at most "
@@ -140,7 +135,7 @@ def packing_of(arrays: Arrays, nearest: float) -> Packed8:
         if farthest / 2.0 ** (exponent - 1) <= GRID:
             exponent -= 1
         step = 2.0 ** max(exponent, LEAST_STEP_EXPONENT)
-    for lists, part in _pieces(counts):
+    for lists, part in _pieces(arrays.offsets):
         # Whole steps, exactly: a division by a power of two; what is before the eye stays there
         faces = np.stack([arrays.front[part], arrays.back[part]], axis=1).astype(np.float64) / step
         np.maximum(faces, np.ceil(max(nearest / step, -(2.0**30))), out=faces)
@@ -175,12 +170,9 @@ def packing_of(arrays: Arrays, nearest: float) -> Packed8:
     return Packed8(step, arrays.offsets, origins, strides, words)
 
 
-def _pieces(counts: NDArray[np.int64]) -> Iterator[tuple[slice, slice]]:
+def _pieces(offsets: NDArray[np.uint64]) -> Iterator[tuple[slice, slice]]:
     """Lists one after the other and their supersegments, in pieces of about :data:`_PIECE`."""
-    ends = np.cumsum(counts)
-    first_list = first = 0
-    while first_list < len(counts):
-        last_list = max(int(np.searchsorted(ends, first + _PIECE, side="right")), first_list + 1)
-        last = int(ends[last_list - 1])
-        yield slice(first_list, last_list), slice(first, last)
-        first_list, first = last_list, last
+    starts = offsets.view(np.int64)
+    firsts = np.searchsorted(starts, np.arange(0, starts[-1], _PIECE))
+    for first, last in itertools.pairwise(np.unique(np.append(firsts, len(starts) - 1))):
+        yield slice(first, last), slice(starts[first], starts[last])

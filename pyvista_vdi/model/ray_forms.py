@@ -1,9 +1,7 @@
-"""Rays as the kernels take them: affine forms of the pixel, in float64 (docs/dev/conventions.md).
+"""Rays as the kernels take them: affine forms of the pixel and of t (``opencl/lib/rays.cl``).
 
-Along the ray of a pixel every quantity that the kernels need (a coordinate, the distance from a
-clipping plane, a homogeneous denominator) is affine in the pixel's position and in t, the view
-depth of the ray's camera less a reference depth. The six numbers of each such form are computed
-here in float64, so that an eye or an origin far away costs the kernels' float32 nothing.
+Their numbers are computed in float64, about the depth at which rays reach the data, so that an eye
+or an origin far away costs the kernels' float32 nothing (docs/dev/conventions.md#rays).
 """
 
 import reprlib
@@ -15,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
-from pyvista_vdi.model.camera import Camera, check_window_size
+from pyvista_vdi.model.camera import Camera, unit
 from pyvista_vdi.model.checks import as_floats
-from pyvista_vdi.model.cropping import Cropping
+from pyvista_vdi.model.cropping import AXES, Cropping
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.view import bounds_corners, projected
 
@@ -25,9 +23,6 @@ Floats: TypeAlias = NDArray[np.float64]
 
 #: Depth before which nothing is looked up in perspective, in diagonals of the bounds ("Lengths").
 NEAREST_DEPTH = 1e-6
-
-#: Lengths times reciprocal depths beyond which, or below whose reciprocal, float32 loses digits.
-LARGEST_PRODUCT = 1e36
 
 
 class Rectangle(NamedTuple):
@@ -56,19 +51,21 @@ class PixelRays:
     ``P(t) = pixel @ origin + t * (pixel @ direction)`` with ``pixel = (1, a, b)``, a and b the
     offsets of the pixel's centre from the window's, in pixels, and t view depth less
     ``reference_depth``, world units. ``origin`` and ``direction``: float64 (3, 3), rows for 1, a
-    and b; model units.
+    and b; model units. ``depths``: the least and the largest view depth of the bounds that they
+    are formed for.
     """
 
     origin: Floats
     direction: Floats
     reference_depth: float
+    depths: tuple[float, float]
 
-    def form(self, normal: ArrayLike, offset: float = 0.0) -> Floats:
-        """Six numbers of the function ``normal . P + offset`` of model points P."""
-        normal = np.asarray(normal, dtype=np.float64)
-        form = np.concatenate([self.origin @ normal, self.direction @ normal])
-        form[0] += offset
-        return form
+    def forms(self, rows: Floats) -> Floats:
+        """Six numbers each of functions ``row[:3] . P + row[3]`` of model points P, (n, 6)."""
+        normals = rows[:, :3, np.newaxis]
+        forms = np.hstack([self.origin @ normals, self.direction @ normals])[:, :, 0]
+        forms[:, 0] += rows[:, 3]
+        return forms
 
 
 def depth_range(camera: Camera, bounds: Sequence[float]) -> tuple[float, float]:
@@ -83,35 +80,29 @@ def depth_range(camera: Camera, bounds: Sequence[float]) -> tuple[float, float]:
 
 
 def nearest_depth(camera: Camera, bounds: Sequence[float]) -> float:
-    """Return the view depth before which nothing is looked up in perspective, world units.
+    """Return the view depth before which nothing is looked up, world units.
 
-    :data:`NEAREST_DEPTH` diagonals of the bounds, by the model transform's largest stretch.
+    :data:`NEAREST_DEPTH` diagonals of the bounds, by the model transform's largest stretch; -inf in
+    parallel projection.
     """
+    if camera.parallel_projection:
+        return -np.inf
     diagonal = float(np.linalg.norm(np.subtract(bounds[1::2], bounds[::2])))
     return NEAREST_DEPTH * diagonal * float(np.linalg.norm(camera.model_transform[:3, :3], 2))
-
-
-def reference_depth(camera: Camera, bounds: Sequence[float]) -> float:
-    """Return the view depth about which rays and lists are formed, world units.
-
-    The near depth of the bounds where the eye is outside, 0 where they reach behind it.
-    """
-    near, _ = depth_range(camera, bounds)
-    return near if camera.parallel_projection else max(near, 0.0)
 
 
 def check_list_space(camera: Camera, bounds: Sequence[float]) -> None:
     """Refuse a generating view whose lists float32 cannot express (docs/dev/numerics.md).
 
-    Lengths times reciprocal depths leave its range then.
+    Lengths times reciprocal depths leave 1e-36 to 1e36 then, beyond which it loses digits.
     """
     near, far = (1.0, 1.0) if camera.parallel_projection else depth_range(camera, bounds)
-    near = max(near, 0.0 if camera.parallel_projection else nearest_depth(camera, bounds))
+    near = max(near, nearest_depth(camera, bounds))
     diagonal = float(np.linalg.norm(np.subtract(bounds[1::2], bounds[::2])))
     if not (0 < near <= far and diagonal > 0):
         return  # nothing is seen
     products = (1 / near / near, 1 / far / far, diagonal / near / far, diagonal)
-    if min(products) < 1 / LARGEST_PRODUCT or max(products) > LARGEST_PRODUCT:
+    if min(products) < 1e-36 or max(products) > 1e36:
         raise InvalidCameraError(
             f"view depths from {near:.3g} to {far:.3g} world units, of bounds that are "
             f"{diagonal:.3g} model units across, are beyond float32: scale the spacing (or the "
@@ -120,9 +111,14 @@ def check_list_space(camera: Camera, bounds: Sequence[float]) -> None:
 
 
 def pixel_rays(camera: Camera, window_size: Sequence[int], bounds: Sequence[float]) -> PixelRays:
-    """Return the rays of a camera's window in the model frame, about the bounds' near depth."""
-    width, height = check_window_size(window_size)
-    depth = reference_depth(camera, bounds)
+    """Return the rays of a camera's window in the model frame.
+
+    The reference depth is the bounds' near one where the eye is outside, 0 where they reach behind
+    it.
+    """
+    width, height = window_size
+    depths = depth_range(camera, bounds)
+    depth = depths[0] if camera.parallel_projection else max(depths[0], 0.0)
     origin, direction = camera.ray_coefficients((width, height))
     per_pixel = np.array([[1.0], [2 / width], [2 / height]])  # (u, v) to pixel offsets
     origin = (origin + depth * direction) * per_pixel
@@ -131,7 +127,7 @@ def pixel_rays(camera: Camera, window_size: Sequence[int], bounds: Sequence[floa
     linear = to_model[:3, :3].T
     origin = origin @ linear
     origin[0] += to_model[:3, 3]
-    return PixelRays(origin, direction @ linear, depth)
+    return PixelRays(origin, direction @ linear, depth, depths)
 
 
 def inverse_affine(matrix: Floats) -> Floats:
@@ -144,76 +140,71 @@ def inverse_affine(matrix: Floats) -> Floats:
     return inverse
 
 
-def box_planes(
-    rays: PixelRays, bounds: Sequence[float], normals: ArrayLike = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
-) -> list[Floats]:
+def box_planes(rays: PixelRays, bounds: ArrayLike, normals: ArrayLike = AXES) -> Floats:
     """Return the six forms that keep what is inside bounds along normals of the model frame."""
-    forms = []
-    for axis, normal in enumerate(np.asarray(normals)):
-        forms.append(rays.form(normal, -bounds[2 * axis]))
-        forms.append(rays.form(-normal, bounds[2 * axis + 1]))
-    return forms
+    low, high = np.reshape(bounds, (3, 2)).T
+    rows = np.column_stack([normals, -low]), np.column_stack([np.negative(normals), high])
+    return rays.forms(np.vstack(rows))
 
 
-def view_planes(camera: Camera, rays: PixelRays, planes: Sequence[Sequence[float]]) -> list[Floats]:
+def view_planes(camera: Camera, rays: PixelRays, planes: Sequence[Sequence[float]]) -> Floats:
     """Return the forms that keep what is in front of the eye and of clipping planes of the world.
 
     In parallel projection there is none of the eye. See :attr:`RenderOptions.clipping_planes`.
     """
-    forms = [np.array([rays.reference_depth, 0, 0, 1.0, 0, 0])]
+    table, matrix, rows = np.reshape(planes, (-1, 6)), camera.model_transform, []
+    # Of unit normals: a form of one that float32 cannot hold would clip nothing
+    for origin, normal in zip(table[:, :3], unit(table[:, 3:]), strict=True):
+        rows.append([*(normal @ matrix[:3, :3]), normal @ (matrix[:3, 3] - origin)])
+    forms = rays.forms(np.reshape(rows, (-1, 4)))
     if camera.parallel_projection:
-        forms = []
-    if len(planes) == 0:
         return forms
-    table = np.array(planes)
-    # Unit normals, scaled first: a form of one that float32 cannot hold would clip nothing
-    normals = table[:, 3:] / np.abs(table[:, 3:]).max(axis=1, keepdims=True)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    matrix = camera.model_transform
-    for origin, normal in zip(table[:, :3], normals, strict=True):
-        forms.append(rays.form(normal @ matrix[:3, :3], normal @ (matrix[:3, 3] - origin)))
-    return forms
+    return np.vstack([[rays.reference_depth, 0, 0, 1, 0, 0], forms])
 
 
 def cropped(
     rays: PixelRays, cropping: Cropping | None, bounds: Sequence[float]
-) -> tuple[list[Floats], list[Floats], int]:
+) -> tuple[Floats, Floats, int]:
     """Return how a kernel crops the rays through a box: by what it clips to, and what is left.
 
     First forms to clip to: a box, or nothing at all. Then six that are positive beyond the low and
     the high plane of each axis, for ``opencl/lib/cropping.cl``, and the regions that belong to
     them; none and 0 where clipping is enough.
     """
+    none = np.empty((0, 6))
     if cropping is None:
-        return [], [], 0
-    cuts, box = cropping.within(bounds)
-    if box is None:
-        normals = np.repeat(cropping.normals, 2, axis=0)
-        forms = [rays.form(normal, -at) for normal, at in zip(normals, cuts.ravel(), strict=True)]
-        return [], forms, cropping.regions
-    if np.isnan(box).any():
-        return [np.array([-1.0, 0, 0, 0, 0, 0])], [], 0  # a plane that keeps nothing
-    if np.array_equal(box, cropping.reach(bounds)):
-        return [], [], 0
-    return box_planes(rays, box.ravel().tolist(), cropping.normals), [], 0
+        return none, none, 0
+    box, planes = cropping.reach(bounds), np.reshape(cropping.planes, (3, 2))
+    planes = np.maximum.accumulate(planes, axis=1)  # nothing is between a low one and less
+    # Within the bounds, so that a plane far away costs float32 nothing
+    cuts = np.clip(planes, box[:, :1], box[:, 1:])
+    borders = np.column_stack([box[:, 0], cuts, box[:, 1]])
+    x, y, z = np.diff(borders, axis=1) > 0
+    there = x[:, None, None] & y[:, None] & z
+    kept = (cropping.regions >> np.arange(27).reshape(3, 3, 3).T & 1) == 1
+    places = np.argwhere(there & kept)
+    if not len(places):
+        return np.array([[-1.0, 0, 0, 0, 0, 0]]), none, 0  # a plane that keeps nothing
+    if not (there & ~kept).any():
+        return none, none, 0
+    first, last = places.min(axis=0), places.max(axis=0) + 1
+    if (there & ~kept)[tuple(map(slice, first, last))].any():  # what is kept is no box
+        rows = np.column_stack([np.repeat(cropping.normals, 2, axis=0), -cuts.ravel()])
+        return none, rays.forms(rows), cropping.regions
+    ends = borders[range(3), first], borders[range(3), last]
+    return box_planes(rays, np.stack(ends, axis=1), cropping.normals), none, 0
 
 
-def direction_forms(
-    rays: PixelRays, window_size: Sequence[int], multiplier: float = 1.0
-) -> list[Floats]:
+def direction_forms(rays: PixelRays, window_size: Sequence[int], multiplier: float = 1.0) -> Floats:
     """Return forms whose slopes are the rays' direction, times a factor, over a power of two.
 
     With that power as their value, see ``model_speed`` of ``lib/list_space.cl``. Slopes are
     about 1 then, and squares of theirs neither overflow nor vanish in float32, whatever the units.
     """
-    forms = np.zeros((3, 6))
-    forms[:, 3:] = multiplier * rays.direction.T
-    reach = np.abs(forms[:, 3:]) @ [1.0, *np.asarray(window_size) / 2]
-    _, exponent = np.frexp(reach.max())
-    unit = np.ldexp(1.0, int(np.clip(exponent, -126, 126)))
-    forms[:, 3:] /= unit
-    forms[:, 0] = unit
-    return [*forms]
+    slopes = multiplier * rays.direction.T
+    _, exponent = np.frexp((np.abs(slopes) @ [1.0, *np.divide(window_size, 2)]).max())
+    power = np.ldexp(1.0, int(np.clip(exponent, -126, 126)))
+    return np.column_stack([np.tile([power, 0, 0], (3, 1)), slopes / power])
 
 
 def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
@@ -232,30 +223,22 @@ def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
 
 
 def largest_value(
-    camera: Camera, window_size: Sequence[int], bounds: Sequence[float], forms: Sequence[Floats]
+    rays: PixelRays, camera: Camera, window_size: Sequence[int], bounds: ArrayLike, forms: Floats
 ) -> float:
-    """Return the largest magnitude of :func:`pixel_rays`' forms on rays that meet the bounds.
+    """Return the largest magnitude of forms on rays that meet the bounds, over their depths.
 
-    Over the depths of the bounds; of each form's first number, too. Infinite where nothing of them
-    is in the window.
+    Of each form's first number, too.
     """
-    width, height = window_size
-    near, far = depth_range(camera, bounds)
-    depth = reference_depth(camera, bounds)
-    low, high = np.array([-width / 2, -height / 2]), np.array([width / 2, height / 2])
-    if camera.parallel_projection or near > 0:  # the bounds have a place in the window
-        matrix = camera.viewport_matrix((width, height)) @ camera.model_to_view
-        x, y, _, d = matrix @ np.vstack([bounds_corners(bounds).T, np.ones(8)])
-        at = np.array([x / d * width / 2, y / d * height / 2])
-        low, high = np.clip(at.min(axis=1), low, high), np.clip(at.max(axis=1), low, high)
-    pixels = np.array([[1, a, b] for a in (low[0], high[0]) for b in (low[1], high[1])])
-    table = np.asarray(forms)
-    values, slopes = pixels @ table[:, :3].T, pixels @ table[:, 3:].T
-    parts = (table[:, 0], values, values + (far - depth) * slopes)
-    return float(max(np.abs(part).max() for part in parts))
+    places = projected(camera, window_size, bounds_corners(bounds))
+    places = np.array([(0, 0), window_size]) if places is None else np.clip(places, 0, window_size)
+    ends = np.array([places.min(axis=0), places.max(axis=0)]) - np.divide(window_size, 2)
+    pixels = np.reshape(np.meshgrid(1.0, *ends.T), (3, 4)).T
+    values, slopes = pixels @ forms[:, :3].T, pixels @ forms[:, 3:].T
+    far = rays.depths[1] - rays.reference_depth
+    return float(np.abs(np.vstack([forms[:, 0], values, values + far * slopes])).max())
 
 
-def pixels_of_points(camera: Camera, window_size: tuple[int, int], points: Floats) -> Rectangle:
+def pixels_of_points(camera: Camera, window_size: Sequence[int], points: Floats) -> Rectangle:
     """Return a part of a window that the convex hull of model points lies in, float64 (n, 3).
 
     All of the window, if one of them is not in front of the eye; two pixels more than the points

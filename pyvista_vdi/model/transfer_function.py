@@ -16,8 +16,6 @@ from pyvista_vdi.model.lighting import Shading
 #: Optical depth that a fully opaque sample gets per step: exp(-30) is 1e-13, nothing passes.
 OPAQUE_OPTICAL_DEPTH = 30.0
 
-_UNIT = Number("a positive length in model units", open_ended=True, name="unit_distance", none=True)
-
 #: Share of a volume's scalar range beyond which VTK tells no gradient magnitudes apart.
 GRADIENT_SHARE = 0.25
 
@@ -95,7 +93,8 @@ class TransferFunction:
                 f"got {self.scalar_range!r}"
             )
         put(self, "scalar_range", (low, high))
-        put(self, "unit_distance", _UNIT(self.unit_distance))
+        length = Number("a length in model units", open_ended=True, none=True)
+        put(self, "unit_distance", length(self.unit_distance, "unit_distance"))
         one_of(self.interpolation, "interpolation", ("nearest", "linear"))
         if not isinstance(self.shading, Shading | None):
             raise InvalidArgumentError(

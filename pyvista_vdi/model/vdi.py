@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import os
 import reprlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,17 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pyvista_vdi import registry
-from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError, UnsupportedError, VDIError
+from pyvista_vdi.errors import InvalidVDIError, UnsupportedError, VDIError
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_bounds, as_number, as_range, as_whole, one_of
-from pyvista_vdi.model.packing import PRECISIONS, Arrays, Packed8, lengths_of_lists, packing_of
+from pyvista_vdi.model.packing import PRECISIONS, Arrays, Packed8, packing_of
 from pyvista_vdi.model.transfer_function import TransferFunction
 
 #: What of a camera differs between a view on the screen and one that covers all of a volume.
 LENS = ("view_angle", "use_horizontal_view_angle", "parallel_scale", "window_center")
-
-#: Straight colours and optical depths of supersegments.
-Media = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 #: Cells of the tables that a transfer function is integrated in, over the range of values: a window
 #: of a fiftieth of it has 327.
@@ -43,21 +40,22 @@ class Lists:
     bounds: tuple[float, float, float, float, float, float]
     depth_origin: float
     metadata: dict[str, Any]
-    #: The lists in the form of a VDI: of a VDI itself.
-    lists: VDI
+    #: What makes the arrays when they are asked for, by its ``arrays()``, not public: lists on the
+    #: device that made them, 8-byte supersegments, or values and a transfer function.
+    late: Any
+    _arrays: Arrays | None
 
     @property
     def arrays(self) -> Arrays:
         """All arrays, in the order of :class:`VDI`'s arguments; made now if they are not yet."""
-        lists = self.lists
-        if lists._arrays is None:
-            lists._arrays = _read_only(lists.late.arrays())
-        return lists._arrays
+        if self._arrays is None:
+            self._arrays = _read_only(self.late.arrays())
+        return self._arrays
 
     @property
     def offsets(self) -> NDArray[np.uint64]:
         """Where each list begins, uint64 (W * H + 1,); the last entry is their number n."""
-        known = getattr(self.lists.late, "offsets", None)
+        known = getattr(self.late, "offsets", None)
         return self.arrays.offsets if known is None else known
 
     @property
@@ -73,26 +71,30 @@ class Lists:
     @property
     def n_supersegments(self) -> int:
         """Number of supersegments in all lists."""
-        known = getattr(self.lists.late, "n_supersegments", None)
+        known = getattr(self.late, "n_supersegments", None)
         return int(self.offsets[-1]) if known is None else known
 
     @property
     def counts(self) -> NDArray[np.int64]:
         """Supersegments per list, int64 (H, W), bottom row first."""
-        return lengths_of_lists(self.offsets).reshape(self.window_size[::-1])
+        return np.diff(self.offsets).astype(np.int64).reshape(self.window_size[::-1])
 
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays, with those of the packed form, or of what makes them when asked."""
-        lists = self.lists
-        if lists._arrays is None:
-            return getattr(lists.late, "nbytes", 0)
-        return sum(array.nbytes for array in lists._arrays) + getattr(lists.packing, "nbytes", 0)
+        if self._arrays is None:
+            return getattr(self.late, "nbytes", 0)
+        return sum(array.nbytes for array in self._arrays) + getattr(self.packing, "nbytes", 0)
+
+    @property
+    def packing(self) -> Packed8 | None:
+        """The lists' 8-byte form, not public; ``None`` where they are exact."""
+        return self.late if isinstance(self.late, Packed8) else None
 
     @property
     def precision(self) -> str:
         """What a supersegment takes on a device and in a file: see :meth:`VDI.with_precision`."""
-        return "exact" if self.lists.packing is None else "8-byte"
+        return "exact" if self.packing is None else "8-byte"
 
     @property
     def picture_size(self) -> tuple[int, int]:
@@ -101,7 +103,7 @@ class Lists:
         The plotter's or the window's that was asked for, where lists cover more or a dial has
         chosen them; else :attr:`window_size`.
         """
-        return picture_size(self.window_size, self.metadata)
+        return picture_view(self)[1]
 
     def equals(self, other: Any) -> bool:
         """Whether all arrays, the view, the bounds and the range are the same to the last bit."""
@@ -120,6 +122,19 @@ class Lists:
         ``kept.save("brain.html", cmap="bone", opacity="sigmoid")``. An ``.exr`` holds colours.
         """
         return registry.method("VDI.save")(self, path, **options)  # type: ignore[no-any-return]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies and other processes are given: words of 8 bytes, or arrays."""
+        arrays = None if self.packing else self.arrays
+        return {**vars(self), "_arrays": arrays, "late": self.packing}
+
+    def __repr__(self) -> str:
+        width, height = self.window_size
+        occupied = int(np.count_nonzero(self.counts))
+        return (
+            f"{type(self).__name__}({width} x {height} lists, {occupied} not empty, "
+            f"{self.n_supersegments} supersegments, {self.nbytes / 2**20:.1f} MiB)"
+        )
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
         """Return what a notebook shows: a viewer, or a picture."""
@@ -163,11 +178,6 @@ class VDI(Lists):
         If an element breaks a rule; the message names the element and the rule.
     """
 
-    #: What makes the arrays when they are asked for, by its ``arrays()``, not public: lists on the
-    #: device that made them, 8-byte supersegments, or values and a transfer function.
-    late: Any
-    _arrays: Arrays | None
-
     def __init__(
         self,
         camera: Camera,
@@ -196,16 +206,6 @@ class VDI(Lists):
         _check(self)
 
     @property
-    def lists(self) -> VDI:  # type: ignore[override]
-        """The lists in the form of a VDI: itself."""
-        return self
-
-    @property
-    def packing(self) -> Packed8 | None:
-        """The lists' 8-byte form, not public; ``None`` where they are exact."""
-        return self.late if isinstance(self.late, Packed8) else None
-
-    @property
     def color(self) -> NDArray[np.float32]:
         """Straight RGB, 0 to 1, float32 (n, 3)."""
         return self.arrays.color
@@ -214,11 +214,6 @@ class VDI(Lists):
     def optical_depth(self) -> NDArray[np.float32]:
         """From front to back along the list's centre ray, float32 (n,)."""
         return self.arrays.optical_depth
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and other processes are given: words of 8 bytes, or arrays."""
-        arrays = None if self.packing else self.arrays
-        return {**vars(self), "_arrays": arrays, "late": self.packing}
 
     def list_at(self, x: int, y: int) -> slice:
         """Return the supersegments of pixel (x, y), y = 0 at the bottom, as a slice."""
@@ -257,14 +252,6 @@ class VDI(Lists):
         exact = precision == "exact"
         return made_vdi(self.arrays if exact else packing_of(self.arrays, _nearest(self)), self)
 
-    def __repr__(self) -> str:
-        width, height = self.window_size
-        occupied = int(np.count_nonzero(self.counts))
-        return (
-            f"VDI({width} x {height} lists, {occupied} not empty, "
-            f"{self.n_supersegments} supersegments, {self.nbytes / 2**20:.1f} MiB)"
-        )
-
 
 class DeferredVDI(Lists):
     """A VDI whose supersegments keep the mean and the spread of the values along the ray.
@@ -296,8 +283,6 @@ class DeferredVDI(Lists):
         If something breaks a rule; the message names it and the rule.
     """
 
-    #: Its lists in the form of a VDI, for storage: colours are no colours (docs/files.md).
-    lists: VDI
     value_range: tuple[float, float]
     unit_distance: float
     sample_distance: float
@@ -309,14 +294,14 @@ class DeferredVDI(Lists):
                 f"its values are of version {version!r}, and this program reads version 1: "
                 "upgrade by pip install -U pyvista-vdi"
             )
-        if lists.n_supersegments and not float(lists.optical_depth.max()) <= 0.5:
+        if (lists.optical_depth > 0.5).any():
             k = int(np.argmax(lists.optical_depth))
             raise InvalidVDIError(
                 f"supersegment {k} breaks the rule '0 <= spread <= 0.5': {lists.optical_depth[k]}"
             )
         ends = about.get("value_range")
         low, high = self.value_range = as_range(ends)
-        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        if not -math.inf < low < high < math.inf:
             raise InvalidVDIError(
                 f"value_range must be two finite numbers, low < high; got {ends!r}"
             )
@@ -328,14 +313,17 @@ class DeferredVDI(Lists):
                 raise InvalidVDIError(f"{name} must be a length above 0; got {about.get(name)!r}")
             setattr(self, name, length)
         self.about["importance"] = None  # older files say what counted most when lists were cut
-        for name in ("camera", "window_size", "bounds", "depth_origin", "metadata"):
-            setattr(self, name, getattr(lists, name))
-        self.lists = lists
+        vars(self).update(vars(lists))
+
+    @property
+    def lists(self) -> VDI:
+        """Its lists in the form of a VDI, for storage: colours are no colours (docs/files.md)."""
+        return made_vdi(self.late or self.arrays, self)
 
     @cached_property
     def mean(self) -> NDArray[np.float32]:
         """Mean by length, as a share of the range of values, float32 (n,)."""
-        color = self.lists.color
+        color = self.arrays.color
         mean = color[:, 0]
         if self.precision != "exact":  # two bytes: what is left below the first is in the second
             mean = np.minimum(mean + color[:, 1] / np.float32(255), np.float32(1))
@@ -345,17 +333,17 @@ class DeferredVDI(Lists):
     @property
     def spread(self) -> NDArray[np.float32]:
         """Standard deviation by length, as a share of the range of values, float32 (n,)."""
-        return self.lists.optical_depth
+        return self.arrays.optical_depth
 
     @property
     def share(self) -> NDArray[np.float32]:
         """Share of the length that holds values of the range, float32 (n,)."""
-        return self.lists.color[:, 2]
+        return self.arrays.color[:, 2]
 
     @cached_property
     def steps(self) -> NDArray[np.float32]:
         """Steps of the march through what each supersegment holds, float32 (n,)."""
-        length = lengths_of(self.lists) / self.sample_distance
+        length = lengths_of(self) / self.sample_distance
         return (length * self.share).astype(np.float32)
 
     def with_precision(self, precision: str) -> DeferredVDI:
@@ -366,9 +354,8 @@ class DeferredVDI(Lists):
         """
         if one_of(precision, "precision", PRECISIONS) == self.precision:
             return self
-        lists = self.lists
         mean = self.mean.astype(np.float64)
-        low, spread = np.zeros_like(mean), lists.optical_depth
+        low, spread = np.zeros_like(mean), self.spread
         if precision == "8-byte":
             # Fewer codes than there is room for, which compress better: 255 * 15, and 4 bits
             whole = np.round(mean * 3825)
@@ -376,7 +363,7 @@ class DeferredVDI(Lists):
             fraction, exponent = np.frexp(spread)
             spread = np.ldexp(np.round(fraction * 16) / 16, exponent)
         color = np.stack([mean, low, self.share], axis=1).astype(np.float32)
-        plain = made_vdi(lists.arrays._replace(color=color, optical_depth=spread), lists)
+        plain = made_vdi(self.arrays._replace(color=color, optical_depth=spread), self)
         return DeferredVDI(plain.with_precision(precision), self.about)
 
     def classified(self, **look: Any) -> VDI:
@@ -405,7 +392,7 @@ class DeferredVDI(Lists):
 
     def __repr__(self) -> str:
         low, high = self.value_range
-        return repr(self.lists).replace("VDI(", "DeferredVDI(")[:-1] + f", {low:g} to {high:g})"
+        return f"{super().__repr__()[:-1]}, {low:g} to {high:g})"
 
 
 def made_vdi(arrays: Any, like: Lists | None = None, **attributes: Any) -> VDI:
@@ -495,16 +482,20 @@ def _check(vdi: VDI) -> None:
 
 def lengths_of(lists: Lists) -> NDArray[np.float64]:
     """Return the model length of each supersegment along its list's centre ray, float64 (n,)."""
-    across, along = ((2 * np.arange(n) + 1) / n - 1 for n in lists.window_size)
-    per_depth = length_per_depth(lists.camera, lists.window_size, across, along)
+    per_depth = length_per_depth(lists.camera, lists.window_size)
     thickness = lists.back.astype(np.float64) - lists.front
     return thickness * np.repeat(per_depth.ravel(), lists.counts.ravel())
 
 
 def length_per_depth(
-    camera: Camera, window: tuple[int, int], u: NDArray[np.float64], v: NDArray[np.float64]
+    camera: Camera, window: tuple[int, int], *pixels: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Return model lengths of a world unit of depth along rays through (u, v); (v, u)."""
+    """Return model lengths of a world unit of depth along the rays of pixels x, y; (y, x).
+
+    Of all pixels of the window by default.
+    """
+    x, y = pixels or map(np.arange, window)
+    u, v = (2 * x + 1) / window[0] - 1, (2 * y + 1) / window[1] - 1
     constant, along_u, along_v = camera.ray_coefficients(window)[1] @ (
         np.linalg.inv(camera.model_to_view)[:3, :3].T
     )
@@ -513,58 +504,27 @@ def length_per_depth(
     )
 
 
-def picture_size(window_size: tuple[int, int], metadata: Mapping[str, Any]) -> tuple[int, int]:
-    """Return :attr:`VDI.picture_size` of a VDI of these lists and metadata."""
-    for what in ("screen", "dial"):
-        try:
-            return check_window_size(metadata[what]["window_size"])
-        except (TypeError, KeyError, InvalidArgumentError):  # none, or what somebody has put
-            continue
-    return window_size
-
-
-def picture_view(vdi: Any) -> tuple[Camera, tuple[int, int]]:
+def picture_view(shown: Any) -> tuple[Camera, tuple[int, int]]:
     """Return the view that a VDI, or one of several, was made for, and the size of its picture.
 
-    That on the screen, where the lists cover all of a volume.
+    That on the screen, where the lists cover all of a volume; the size that a dial was given.
     """
-    screen: Any = getattr(vdi, "metadata", {}).get("screen")
-    camera, size = vdi.camera, getattr(vdi, "picture_size", vdi.window_size)
-    try:
-        return camera.replace(**{name: screen[name] for name in LENS}), size
-    except (TypeError, KeyError, VDIError):  # none, or what somebody has put
-        return camera, size
+    camera, size, metadata = shown.camera, shown.window_size, getattr(shown, "metadata", {})
+    for what in ("dial", "screen"):
+        with suppress(TypeError, KeyError, VDIError):  # none, or what somebody has put
+            size = check_window_size(metadata[what]["window_size"])
+    with suppress(TypeError, KeyError, VDIError):
+        camera = camera.replace(**{name: metadata["screen"][name] for name in LENS})
+    return camera, size
 
 
-@dataclass(frozen=True, eq=False)
-class ValuesLook:
-    """Values and the transfer function that a VDI shows of them.
+def classification_of(
+    deferred: DeferredVDI, transfer_function: TransferFunction
+) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    """Return what kernels take of a transfer function, and a classified VDI's metadata.
 
-    ``integrals``: what kernels take of a transfer function, float32 (CELLS + 2, 2, 4): the low end
-    of the range, then the integrals over cells up to each, in pairs of a large part and what it
-    leaves. ``media_of``: what makes straight colours and optical depths of some supersegments.
-    """
-
-    deferred: DeferredVDI
-    integrals: NDArray[np.float32]
-    media_of: Callable[[ValuesLook, Any], Media]
-
-    def arrays(self) -> Arrays:
-        """Return the arrays: what is transparent is left out."""
-        color, optical_depth = self.media_of(self, slice(None))
-        arrays = self.deferred.arrays._replace(color=color, optical_depth=optical_depth)
-        rows = np.flatnonzero(optical_depth > 0)
-        return arrays.take(np.searchsorted(rows, arrays.offsets.view(np.int64)), rows)
-
-
-def classify(
-    deferred: DeferredVDI,
-    transfer_function: TransferFunction,
-    media_of: Callable[[ValuesLook, Any], Media],
-) -> VDI:
-    """Return the VDI that a transfer function makes of what is kept (docs/dev/conventions.md).
-
-    The VDI's arrays are made when they are asked for, by ``media_of``; a raycast asks for none.
+    Float32 (CELLS + 2, 2, 4): the low end of the range, then the integrals over cells up to each,
+    in pairs of a large part and what it leaves (docs/dev/conventions.md).
     """
     for name, asked in (
         ("shading", transfer_function.shading),
@@ -593,10 +553,7 @@ def classify(
         of_step = -np.expm1(np.log1p(-opacity) * deferred.sample_distance / unit)
     of_cells = np.stack([*(of_step * each for each in rgb), of_step], axis=1)
     units = np.rint(of_cells * _UNITS).astype(np.int64)
-    table = np.zeros((CELLS + 2, 4), np.int64)
-    table[0] = units[0]
-    np.cumsum(units[1:], axis=0, out=table[2:])
-    whole = table / _UNITS
+    whole = np.concatenate([units[:1], 0 * units[:1], units[1:].cumsum(axis=0)]) / _UNITS
     large = whole.astype(np.float32)
     integrals = np.stack([large, (whole - large).astype(np.float32)], axis=1)
     metadata = {
@@ -605,4 +562,4 @@ def classify(
         "transfer_function": transfer_function.to_dict(),
         "deferred": {**deferred.about, "value_range": [*deferred.value_range]},
     }
-    return made_vdi(ValuesLook(deferred, integrals, media_of), deferred, metadata=metadata)
+    return integrals, metadata

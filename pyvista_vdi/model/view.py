@@ -3,31 +3,19 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
+from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Grid
 
 #: Most lists that a covering view may have, as a multiple of the window's pixels.
 MAX_LISTS_PER_PIXEL = 4.0
 
-#: Least depth in front of the eye at which a corner can be projected, as a share of the diagonal
-#: of all corners; below it the rectangle on the screen has no useful size.
-_NEAREST = 1e-3
-
 #: A corner this little beyond a pixel's border, in pixels, does not need another row of lists.
 SLACK = 1e-6
-
-#: Rays along an edge of the window that tell what is seen, and by how much of V_O's window a point
-#: may lie outside of it by rounding.
-_RAYS, _COVERAGE_SLACK = 33, 1e-5
-
-#: Edges of a voxel that differ by less are the same.
-_COARSER = 1.01
 
 
 @dataclass(frozen=True)
@@ -46,11 +34,11 @@ class View:
         if self == other:
             return 0.0
         places = []
-        for camera, size in ((self.camera, self.size), (other.camera, other.size)):
-            pixels = projected(camera, size, bounds_corners(bounds))
+        for view in (self, other):
+            pixels = projected(view.camera, view.size, bounds_corners(bounds))
             if pixels is None:
                 return math.inf
-            places.append(pixels + (np.asarray(camera.window_center) - 1) / 2 * np.asarray(size))
+            places.append(pixels + (np.array(view.camera.window_center) - 1) / 2 * view.size)
         return float(np.linalg.norm(places[0] - places[1], axis=1).max()) / (self.size[1] / 2)
 
 
@@ -68,7 +56,7 @@ def covering_view(
     width w in a window of width W has t' = t w / W and c' t' = t (c + (x0 + x1) / W - 1); the same
     in y, and with s for t in parallel projection (docs/dev/conventions.md#list-coordinates).
     """
-    size = np.asarray(check_window_size(window_size), dtype=np.float64)
+    size = np.asarray(window_size, dtype=np.float64)
     pixels = projected(camera, window_size, np.asarray(corners, dtype=np.float64))
     if pixels is None:
         return None
@@ -95,34 +83,29 @@ def covering_view(
     return camera.replace(window_center=middle / new_half, **lens), (width, height)
 
 
-def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
+def coverage(vdi: VDI, camera: Camera, window_size: Sequence[int]) -> float:
     """Return the share of a view's rays through the volume that the VDI has all of, 0 to 1.
 
     Below 1 a part of the volume that the view shows lies outside V_O's window, or behind V_O's eye.
-
-    ``vdi``: its camera and window say what it has. ``camera``: the new view V_N. ``window_size``:
-    width and height of its picture in pixels. Returns: 0 to 1, of 33 x 33 rays that reach from edge
-    to edge of the window, and of those through the corners of the bounds; 1 where none of them
-    meets the volume.
+    Of 33 x 33 rays that reach from edge to edge of V_N's window, and of those through the corners
+    of the bounds; 1 where none of them meets the volume.
 
     V_O's window and what lies before its eye are convex: they contain a part of a ray if they
     contain its two ends.
     """
-    to_lists = vdi.camera.viewport_matrix(vdi.window_size) @ vdi.camera.model_to_view
-    if _in_window(to_lists, bounds_corners(vdi.bounds)).all():  # as with coverage="bounds"
+    corners = bounds_corners(vdi.bounds)
+    if _has(vdi, corners).all():  # as with coverage="bounds"
         return 1.0
-    camera = Camera.from_any(camera)
-    to_view, box = camera.model_to_view, _homogeneous(bounds_corners(vdi.bounds))
-    u, v, _, w = camera.viewport_matrix(window_size) @ to_view @ box
-    across = np.linspace(-1.0, 1.0, _RAYS)
-    corners = np.stack([u, v])[:, w > 0] / w[w > 0]
-    places = np.hstack([np.stack(np.meshgrid(across, across)).reshape(2, -1), corners])
+    u, v, _, w = in_viewport(camera, window_size, corners)
+    across = np.linspace(-1.0, 1.0, 33)
+    places = np.reshape(np.meshgrid(across, across), (2, -1))
+    places = np.hstack([places, np.stack([u, v])[:, w > 0] / w[w > 0]])
     places = places[:, (np.abs(places) <= 1).all(axis=0)]
     # Points and directions in view space, taken to the model frame
-    to_model = np.linalg.inv(to_view)
+    to_model = np.linalg.inv(camera.model_to_view)
     rays_of = np.vstack([np.ones(places.shape[1]), places]).T
     origins, directions = (rays_of @ part for part in camera.ray_coefficients(window_size))
-    origins = (to_model @ _homogeneous(origins))[:3]
+    origins = to_model[:3, :3] @ origins.T + to_model[:3, 3:]
     directions = to_model[:3, :3] @ directions.T
     # The part of each that lies within the bounds, and before the eye
     low, high = np.reshape(vdi.bounds, (3, 2)).T[:, :, np.newaxis]
@@ -134,8 +117,7 @@ def coverage(vdi: VDI, camera: Any, window_size: Sequence[int]) -> float:
         first = np.maximum(first, 0.0)
     meets = last > first
     near, far = (origins[:, meets] + t[meets] * directions[:, meets] for t in (first, last))
-    held = _in_window(to_lists, near.T) & _in_window(to_lists, far.T) if meets.any() else [True]
-    return float(np.mean(held))
+    return float(np.mean(_has(vdi, near.T) & _has(vdi, far.T))) if meets.any() else 1.0
 
 
 def nearest_depth(grid: Grid, camera: Camera, window_size: Sequence[int]) -> float | None:
@@ -168,20 +150,16 @@ def required_level(levels: Sequence[Grid], camera: Camera, window_size: Sequence
     width = min(2 * np.divide(camera.half_extent(window_size), window_size))
     width *= 1.0 if camera.parallel_projection else depth
     to_view = camera.model_to_view[:3, :3]
-    # Distances of neighbouring points along x, y and z, world units
+    # Distances of neighbouring points along x, y and z, world units; what is less than 1 % is none
     edges = [np.linalg.norm(to_view @ each.index_to_model[:3, :3], axis=0) for each in levels]
-    fine = [now[now > _COARSER * edges[0]].max(initial=0) <= width / 2 for now in edges]
+    fine = [now[now > 1.01 * edges[0]].max(initial=0) <= width / 2 for now in edges]
     return fine.index(False) - 1 if False in fine else len(levels) - 1
 
 
-def _in_window(to_window: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which points, (n, 3), a matrix puts in the window."""
-    u, v, _, w = to_window @ _homogeneous(points)
-    return np.asarray(np.maximum(np.abs(u), np.abs(v)) <= w + _COVERAGE_SLACK * np.abs(w).max())
-
-
-def _homogeneous(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.vstack([points.T, np.ones(len(points))])
+def _has(vdi: VDI, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which model points, (n, 3), lie in V_O's window, or outside by no more than 1e-5."""
+    u, v, _, w = in_viewport(vdi.camera, vdi.window_size, points)
+    return np.asarray(np.maximum(np.abs(u), np.abs(v)) <= w + 1e-5 * np.abs(w).max())
 
 
 #: Which of the six numbers of bounds are x, y and z of each corner, int (3, 8).
@@ -193,19 +171,26 @@ def bounds_corners(bounds: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(bounds, dtype=np.float64)[_CORNERS].T
 
 
+def in_viewport(
+    camera: Camera, window_size: Sequence[int], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return homogeneous viewport coordinates (u d, v d, Z, d) of model points, float64 (4, n)."""
+    matrix = camera.viewport_matrix(window_size) @ camera.model_to_view
+    return np.asarray(matrix[:, :3] @ points.T + matrix[:, 3:])
+
+
 def projected(
     camera: Camera, window_size: Sequence[int], corners: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
     """Return points in pixels from the window's lower left corner.
 
-    None if one is behind the eye or closer than a thousandth of all points' diagonal.
+    None if one is behind the eye or closer than a thousandth of all points' diagonal, where what
+    they cover on the screen has no useful size.
     """
-    points = np.column_stack([corners, np.ones(len(corners))]) @ camera.model_to_view.T
+    u, v, depth, d = in_viewport(camera, window_size, corners)
     if not camera.parallel_projection:
         world = corners @ camera.model_transform[:3, :3].T
         diagonal = float(np.linalg.norm(np.ptp(world, axis=0)))
-        if points[:, 2].min() <= _NEAREST * diagonal:
+        if depth.min() <= 1e-3 * diagonal:
             return None
-    viewport = points @ camera.viewport_matrix(window_size).T
-    uv = viewport[:, :2] / viewport[:, 3:]
-    return (uv + 1) / 2 * np.asarray(window_size)
+    return np.asarray((np.stack([u / d, v / d], axis=1) + 1) / 2 * window_size)

@@ -33,11 +33,6 @@ class Grid:
     direction: NDArray[np.float64]
     unit_distance: float | None = None
 
-    @classmethod
-    def of(cls, grid: Grid) -> Grid:
-        """Return the grid of a volume."""
-        return cls(grid.dimensions, grid.spacing, grid.origin, grid.direction, grid.unit_distance)
-
     @functools.cached_property
     def index_to_model(self) -> NDArray[np.float64]:
         """Point index (x, y, z) to model coordinates, float64 (4, 4)."""
@@ -227,9 +222,7 @@ class Volume(Grid):
     def _range(self) -> tuple[float, float]:
         if self.chunked:
             return self.array.ends  # type: ignore[no-any-return]
-        if self.array.dtype.kind != "f":
-            return float(self.scalars.min()), float(self.scalars.max())
-        low, high = np.fmin.reduce(self.array, axis=None), np.fmax.reduce(self.array, axis=None)
+        low, high = np.fmin.reduce(self.scalars, axis=None), np.fmax.reduce(self.scalars, axis=None)
         return float(low), float(high)
 
     def __repr__(self) -> str:

@@ -1,19 +1,46 @@
 """What a frame shows, and what is made for it: decided by what is seen, without side effects.
 
 Whoever draws looks, asks :func:`plan`, and does what it says; nothing here knows VTK, a device, a
-clock or a thread. ``docs/dev/window_events.md`` is the specification. Distances between views are
-those of :meth:`pyvista_vdi.model.view.View.distance`: about radians, where the volume fills the
+clock or a thread. ``docs/dev/window_events.md`` is the specification. By what rays have taken
+:class:`Costs` tell which draws the better picture in time, VDI or volume. Distances between views
+are those of :meth:`pyvista_vdi.model.view.View.distance`: about radians, where the volume fills the
 picture.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
 
 from pyvista_vdi.model.view import View
-from pyvista_vdi.quality.costs import Costs, RenderMode
+
+#: What can be raycast for a frame.
+RenderMode: TypeAlias = Literal["vdi", "volume"]
+
+#: SSIM lost by drawing every k-th pixel along each edge and interpolating linearly: medians over
+#: six volumes x soft and steep, 640 x 360 pixels, 30 degrees from the generating view
+#: (docs/decisions/render_mode.md).
+_STEPS = (1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
+_LOST = (0.0, 0.0105, 0.013, 0.0188, 0.0319, 0.0445)
+#: Time of a ray through a VDI over that at its generating view, by degrees from there: six volumes
+#: of 128^3 to 256^3 voxels, 20 supersegments, middle of what was seen.
+_ANGLES = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0)
+_RISE = (1.0, 6.4, 14.0, 24.0, 34.0, 40.0)
+#: Share of that which is expected of a GPU: whole pictures of the paper's volumes took 1.6 to 4.1
+#: times as long at 30 degrees there (docs/decisions/gpu.md).
+_ON_GPU = 0.07
+#: Weight of the newest frame in the mean of what frames took.
+_NEWEST = 0.4
+#: SSIM that the other way must gain, and share of the time at rest that it must save, to be taken:
+#: predictions are no better than that, and nothing may flicker.
+_GAIN, _SAVING = 0.004, 0.25
+#: SSIM lost by a VDI so many degrees from its view, and farther, where nothing was estimated: the
+#: median at 30 degrees of docs/performance.md.
+_UNKNOWN_LOSS, _LOST_FROM = 0.012, 5.0
 
 #: Estimated SSIM below which a view at rest gets a VDI of its own. Over the measured views a VDI
 #: of 20 supersegments keeps .96 to .99 when it is only turned; zooming in by two, or looking past
@@ -35,6 +62,47 @@ TOO_COARSE, _TOO_LITTLE = 2.0, 0.9
 SIMILAR = 0.98
 #: Pixels as wide as one list from which on a picture has less detail than its pixels could show.
 FINE_ENOUGH = 1.25
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What a picture takes, by the last frames of both ways, and which way was chosen last.
+
+    That is ``fixed + rays * each`` seconds. The volume's rays take the same from everywhere, and
+    theirs is the picture that a VDI approaches. ``vdi`` is what a VDI's take at its generating
+    view, where they are cheapest: from others :meth:`rise` times as much, which starts with what is
+    expected of the device's kind and follows what frames take.
+    """
+
+    volume: float | None = None
+    vdi: float | None = None
+    way: RenderMode = "vdi"
+    fixed: float = 5e-4
+    slope: float | None = None  # of the rise with the angle, over the typical one of CPUs
+
+    def took(
+        self, way: RenderMode, angle: float, pixels: float, seconds: float, *, gpu: bool
+    ) -> Costs:
+        """Note what a picture's rays have taken, through a VDI so many degrees from its view."""
+        if not (pixels >= 1 and seconds > 0):
+            return self
+        own = replace(self, slope=self.slope or (_ON_GPU if gpu else 1.0))
+        rise, each = (own.rise(angle), self.vdi) if way == "vdi" else (1.0, self.volume)
+        if each is None:
+            found: Any = {way: max(seconds - self.fixed, seconds / 2) / (pixels * rise)}
+            return replace(own, **found)
+        # Divide the relative error among a ray, its rise and what is fixed, by their parts
+        rays = pixels * rise * each
+        total = rays + self.fixed
+        parts = np.array([rays, rays * (1 - 1 / rise), self.fixed]) / total
+        error = _NEWEST * math.log(seconds / total)
+        ray, slope, fixed = np.exp(error * parts / (parts @ parts)).tolist()
+        found = {way: each * ray, "slope": own.slope * slope, "fixed": self.fixed * fixed}
+        return replace(own, **found)
+
+    def rise(self, angle: float) -> float:
+        """Return what a ray takes through a VDI, over one at its view, so many degrees away."""
+        return 1 + (self.slope or 1.0) * (float(np.interp(angle, _ANGLES, _RISE)) - 1)
 
 
 @dataclass(frozen=True)
@@ -175,7 +243,7 @@ def _watched(seen: Seen) -> Plan:
     if seen.draw == "auto" and not seen.joint and seen.volume == "whole":
         way: RenderMode = "volume"
         if made.coverage == 1 and (seen.moving or made.magnification <= FINE_ENOUGH):
-            way = _better(seen, made)
+            way = better_way(seen, made)
         costs = replace(seen.costs, way=way)
         return _planned(seen, way, made.content, costs=costs, **rest)
     return _planned(seen, "vdi", **rest)
@@ -250,13 +318,40 @@ def _unknown(seen: Seen) -> bool:
     return seen.view.distance(known.view, made.bounds) > _ANOTHER_ESTIMATE
 
 
-def _better(seen: Seen, made: Made) -> RenderMode:
-    """Choose VDI or volume, whichever is expected to give the better picture in time."""
-    known = seen.estimate
-    ssim = known.ssim if known is not None and known.vdi == made.known else None
-    bound = SIMILAR if seen.bound is None else seen.bound
-    seconds = seen.seconds if seen.moving else None
-    return seen.costs.better(made.angle, made.pixels, seconds, ssim, bound)
+def better_way(seen: Seen, made: Made) -> RenderMode:
+    """Choose VDI or volume, whichever is expected to give the better picture in time.
+
+    Where both keep a rate with fewer pixels, what the missing pixels lose is weighed against what
+    the VDI loses. Until both have told what they take it is the VDI, and what was drawn last stays
+    unless the other is better by more than predictions are wrong by.
+    """
+    known, costs = seen.estimate, seen.costs
+    seconds = seen.seconds if seen.moving else None  # at rest all pixels are drawn
+    own = _UNKNOWN_LOSS * min(1.0, made.angle / _LOST_FROM)  # what the VDI loses
+    if known is not None and known.vdi == made.known:
+        own = max(0.0, 1 - known.ssim)
+    if seconds is None and own > 1 - (SIMILAR if seen.bound is None else seen.bound):
+        return "volume"
+    if costs.volume is None or costs.vdi is None:
+        return "vdi"
+    each = {"vdi": costs.vdi * costs.rise(made.angle), "volume": costs.volume}
+    times = {way: costs.fixed + max(made.pixels, 1.0) * ray for way, ray in each.items()}
+    other: RenderMode = "volume" if costs.way == "vdi" else "vdi"
+    if seconds is None:
+        changes = times[other] < (1 - _SAVING) * times[costs.way]
+    else:
+        room = max(seconds - costs.fixed, 1e-9)
+        losses = {way: _loss_of_pixels((t - costs.fixed) / room) for way, t in times.items()}
+        losses["vdi"] += own
+        changes = losses[other] < losses[costs.way] - _GAIN
+    return other if changes else costs.way
+
+
+def _loss_of_pixels(too_long: float) -> float:
+    """Return the SSIM lost by as few pixels as it takes to be this many times faster."""
+    step = max(1.0, too_long) ** 0.5
+    beyond = max(0.0, step - _STEPS[-1]) * (_LOST[-1] - _LOST[-2])
+    return float(np.interp(step, _STEPS, _LOST)) + beyond
 
 
 def lacking(seen: Made, cone: float) -> list[tuple[str, str]]:

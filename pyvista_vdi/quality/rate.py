@@ -11,7 +11,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from pyvista_vdi.quality.costs import RenderMode
+from pyvista_vdi.quality.plan import RenderMode
 
 #: Frames whose mean rate is reported (paper section 5), and those that the cost is estimated from:
 #: with more, a quickly turning view is followed too late.
@@ -226,13 +226,12 @@ class Pace:
     def ended(self, seconds: float | None, moving: bool) -> None:
         """End a frame that took so long, where that is known; a hand may move."""
         frame, self.frame = self.frame, _SoFar()
-        if frame.rays:
-            # The first frame began before anybody looked at the clock: its work is known
-            self._record(frame, frame.work if seconds is None else seconds)
         if not (frame.interactive or moving):
             self._recent.clear()
-
-    def _record(self, frame: _SoFar, seconds: float) -> None:
+        if not frame.rays:
+            return
+        if seconds is None:  # the first frame began before anybody looked at the clock
+            seconds = frame.work
         self.seconds = seconds
         if frame.interactive:
             # A stochastic approximation of the quantile (Robbins and Monro 1951)

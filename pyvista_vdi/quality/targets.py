@@ -148,9 +148,7 @@ def generate_anywhere(
             view, size = request.camera, request.window_size
             loaded = request.volume.load(view, window_size=size)
             return generate_anywhere(request.replace(volume=loaded), target)
-        return registry.placed("generators", "blocks", missing="generating by blocks")(
-            request, client
-        )  # type: ignore[no-any-return]
+        return registry.method("generating by blocks")(request, client)  # type: ignore[no-any-return]
     if client is not None:
         raise InvalidArgumentError(
             f"client is for chunked volumes, and {name!r} is in memory: give a Volume of a "
@@ -265,7 +263,7 @@ class _Trials:
     def _loss(self, rung: int) -> float:
         """Estimate 1 - SSIM of the target view."""
         vdi = self.vdi(rung)
-        return 1 - self._estimator.estimate(vdi, self.view.camera, self.view.size).ssim
+        return 1 - self._estimator.estimate(vdi, self.view.camera, self.view.window_size).ssim
 
     def _time(self, rung: int) -> float:
         """Return the seconds of a full frame."""

@@ -129,7 +129,7 @@ class ViewErrorEstimator:
         It may have fewer lists than the VDI that is to be judged. Returns None where the volume is
         not in view; both edges of the window have at least 11 pixels.
         """
-        camera, size = request.camera, request.size
+        camera, size = request.camera, request.window_size
         region = seen_region(camera, size, (vdi.bounds, self._medium.volume.bounds))
         if region is None:
             return None
@@ -146,7 +146,7 @@ class ViewErrorEstimator:
             high = min(band, rows - row)
             corner = (left, top + row * COARSE)
             lens = camera.tile(size, corner, (columns * COARSE, high * COARSE))
-            part = request.replace(camera=lens, size=(columns, high))
+            part = request.replace(camera=lens, window_size=(columns, high))
             pictures[0].append(render_vdi(vdi, part))
             pictures[1].append(raycast_medium(self._medium, part))
         old, new = (over_background(np.concatenate(each), background) for each in pictures)
@@ -158,8 +158,8 @@ class ViewErrorEstimator:
         """Return the pictures of a view's tiles, by a VDI or, without one, by the volume."""
         pictures = []
         for column, row in sample.corners.tolist():
-            lens = request.camera.tile(request.size, (column, row), sample.size)
-            tile = request.replace(camera=lens, size=sample.size)
+            lens = request.camera.tile(request.window_size, (column, row), sample.size)
+            tile = request.replace(camera=lens, window_size=sample.size)
             drawn = raycast_medium(self._medium, tile) if vdi is None else render_vdi(vdi, tile)
             pictures.append(drawn)
         return pictures
@@ -236,13 +236,11 @@ def eye_from_centre(
 
 def _pixel_width(camera: Camera, size: tuple[int, int], bounds: Sequence[float]) -> float:
     """Root of what a pixel covers at mid-depth, model units; infinite behind the eye."""
-    near, far = rays.depth_range(camera, bounds)
-    if not camera.parallel_projection:
-        near = max(near, 0.0)
-        if far <= 0:
-            return math.inf
     pixel_rays = rays.pixel_rays(camera, size, bounds)
-    t = (near + far) / 2 - pixel_rays.reference_depth
+    near, far = pixel_rays.reference_depth, pixel_rays.depths[1]
+    if not camera.parallel_projection and far <= 0:
+        return math.inf
+    t = (near + far) / 2 - near
     _, across, up = pixel_rays.origin + t * pixel_rays.direction
     return math.sqrt(float(np.linalg.norm(np.cross(across, up))))
 

@@ -17,8 +17,9 @@ from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import lists_are_far
 from pyvista_vdi.model.packing import Packed8
-from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, Media, ValuesLook, made_vdi
+from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, made_vdi
 from pyvista_vdi.model.volume import Volume
+from pyvista_vdi.raycasting.classified_values import ValuesLook
 from pyvista_vdi.volume.upload import release_voxels
 
 #: Squares of stacks along the grid's longer edge: `OccupancyGrid.corners` has a box for each.
@@ -51,9 +52,7 @@ _ARRAYS = {
 }
 _COUNTED = ("starts", "fronts", "backs")
 #: What media are made of: colours and optical depths, or a deferred VDI's values.
-_NO_MEDIA = dict.fromkeys(
-    ("colors", "optical_depths", "means", "spreads", "steps", "integrals"), None
-) | {"cells": 0}
+_NO_MEDIA = dict.fromkeys(("colors", "optical_depths", "means", "spreads", "steps", "integrals"))
 
 
 class OccupancyGrid:
@@ -189,27 +188,22 @@ def _share_in_bounds(
     return float(np.maximum(last - first, 0).mean() / depth) if depth > 0 else 0.0
 
 
-def _share_lit(
-    vdi: VDI,
-    near: float,
-    far: float,
-    media_of: Callable[[NDArray[np.int64]], Media] | None = None,
-) -> float:
+def _share_lit(vdi: VDI, near: float, far: float, look: ValuesLook | None = None) -> float:
     """Return how much of the depths from ``near`` to ``far`` light gets through, the lists' mean.
 
     Of some of the lists that are not empty; 1 in a list through which it gets. View depths of V_O.
-    ``media_of``: those of some supersegments, where others are shown than the VDI's.
+    ``look``: has the media that are shown, where they are others than the VDI's.
     """
     offsets = vdi.offsets.view(np.int64)
     lists = np.flatnonzero(np.diff(offsets))
-    sampled = _SAMPLED_LISTS if media_of is None else _SAMPLED_LISTS_OF_VALUES
+    sampled = _SAMPLED_LISTS if look is None else _SAMPLED_LISTS_OF_VALUES
     lists = lists[:: -(-len(lists) // sampled) or 1]
     if not len(lists):
         return 1.0
     counts = offsets[lists + 1] - offsets[lists]
     begins = np.cumsum(counts) - counts
     places = np.arange(counts.sum()) + np.repeat(offsets[lists] - begins, counts)
-    optical_depth = vdi.optical_depth[places] if media_of is None else media_of(places)[1]
+    optical_depth = vdi.optical_depth[places] if look is None else look.media_of(places)[1]
     optical_depth = optical_depth.astype(np.float64)
     before = np.cumsum(optical_depth) - optical_depth
     before -= np.repeat(before[begins], counts)
@@ -219,7 +213,7 @@ def _share_lit(
     depth = front + np.minimum(left, 1.0) * (back - front) + vdi.depth_origin
     through = np.add.reduceat(optical_depth, begins) < _DARK
     shares = np.where(through, 1.0, (depth - near) / max(far - near, np.finfo(np.float64).tiny))
-    if media_of is not None:  # lists of which nothing is shown are empty
+    if look is not None:  # lists of which nothing is shown are empty
         shares = shares[np.add.reduceat(optical_depth, begins) > 0]
     return float(np.clip(shares, 0.0, 1.0).mean()) if len(shares) else 1.0
 
@@ -246,7 +240,7 @@ class PreparedVDI:
         rays.check_list_space(vdi.camera, vdi.bounds)
         #: View depths of the bounds, and the least that is in front of V_O's eye, world units.
         self.depths = near, far = rays.depth_range(vdi.camera, vdi.bounds)
-        self.nearest = rays.nearest_depth(vdi.camera, vdi.bounds) if not self.parallel else -np.inf
+        self.nearest = rays.nearest_depth(vdi.camera, vdi.bounds)
         # An origin much closer than the data costs the coordinate the digits that it is to save
         closest = min(near, self.depth_origin)
         #: Whether the depth coordinate is that of a long lens.
@@ -283,22 +277,20 @@ class PreparedVDI:
 
     def _prepare(self, vdi: VDI, keep: Keep) -> None:
         """Bring the lists to the device, exact or packed, and build the occupancy grid."""
-        runtime = self.runtime
         with contextlib.ExitStack() as stack:
             if vdi.packing is not None:
                 self._prepare_packed(vdi, vdi.packing, keep, stack.enter_context)
             else:
                 # Take the lists from where they were made, or upload them
                 held: dict[str, Any] = {}
-                made_on: Any = getattr(vdi.late, "on", None)
-                if made_on is not None:
-                    held |= stack.enter_context(made_on(runtime))
+                if hasattr(vdi.late, "on"):
+                    held |= stack.enter_context(vdi.late.on(self.runtime))
                 if not held:
                     arrays: Any = zip(_ARRAYS.items(), vdi.arrays, strict=True)
                     for (name, what), array in arrays:
-                        held[name] = stack.enter_context(runtime.upload(array, what))
+                        held[name] = stack.enter_context(self.runtime.upload(array, what))
                 self._prepare_lists(held, self._place_bundles(held, stack.enter_context), keep)
-        if runtime.is_cpu:
+        if self.runtime.is_cpu:
             self.lit = _share_lit(vdi, *self.depths)
 
     def _prepare_packed(self, vdi: VDI, packing: Packed8, keep: Keep, briefly: Keep) -> None:
@@ -347,7 +339,7 @@ class PreparedVDI:
         prepare = runtime.bind(
             "raycasting/prepare.cl",
             "prepare_lists",
-            **{**_NO_MEDIA, **arrays},
+            **{"cells": 0, **_NO_MEDIA, **arrays},
             begins=begins,
             centre_ray=self._centre,
             depth_kind=constants.PARALLEL if self.double_float else self.depth_kind,
@@ -438,9 +430,8 @@ class KeptValues(PreparedVDI):
         arrays = {"means": deferred.mean, "spreads": deferred.spread, "steps": deferred.steps}
         self._lists = made_vdi(deferred.arrays, deferred)
         with kept_together() as keep:
-            #: Means, spreads and steps of the supersegments.
             self.values = {
-                name: keep(runtime.upload(np.ascontiguousarray(array), f"{name} of values"))
+                name: keep(runtime.upload(array, f"{name} of values"))
                 for name, array in arrays.items()
             }
             super().__init__(runtime, self._lists)
@@ -458,7 +449,7 @@ class KeptValues(PreparedVDI):
         """Return what a transfer function shows: what is transparent is left out."""
         runtime, shown = self.runtime, copy.copy(self)
         if runtime.is_cpu:
-            shown.lit = _share_lit(self._lists, *self.depths, partial(look.media_of, look))
+            shown.lit = _share_lit(self._lists, *self.depths, look)
         with (
             kept_together() as keep,
             runtime.upload(look.integrals, "integrals of a transfer function") as table,
@@ -476,9 +467,7 @@ class _MadeOnce:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._places: weakref.WeakKeyDictionary[
-            Any, dict[Runtime, tuple[threading.Lock, list[Any]]]
-        ]
+        self._places: weakref.WeakKeyDictionary[Any, dict[Runtime, tuple[Any, list[Any]]]]
         self._places = weakref.WeakKeyDictionary()
 
     def of(self, runtime: Runtime, thing: Any, make: Callable[[], Any]) -> Any:
@@ -503,9 +492,8 @@ def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
     """Return the VDI on the device, made once and kept as long as the VDI lives."""
 
     def make() -> PreparedVDI:
-        look = vdi.late
-        if isinstance(look, ValuesLook) and look.deferred.n_supersegments:
-            return kept_values(runtime, look.deferred).shown(look)
+        if isinstance(vdi.late, ValuesLook):
+            return kept_values(runtime, vdi.late.deferred).shown(vdi.late)
         return PreparedVDI(runtime, vdi)
 
     return _prepared.of(runtime, vdi, make)  # type: ignore[no-any-return]
@@ -526,6 +514,5 @@ def release_from_devices(things: Iterable[VDI | DeferredVDI | Volume | None]) ->
             _kept.release(thing)
         elif thing is not None:
             _prepared.release(thing)
-            late: Any = thing.late
-            if hasattr(late, "on"):
-                late.arrays()
+            if hasattr(thing.late, "on"):
+                thing.late.arrays()

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, get_runtime, padded
 from pyvista_vdi.model.options import FrameRequest
-from pyvista_vdi.model.ray_forms import reference_depth
+from pyvista_vdi.model.ray_forms import pixel_rays
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose
 from pyvista_vdi.raycasting.picking import FirstHit
@@ -26,7 +26,7 @@ def render_vdi(vdi: VDI, request: FrameRequest) -> NDArray[np.float32]:
     """
     runtime = get_runtime(request.device)
     prepared = prepared_vdi(runtime, vdi)
-    shape, out = (*request.size[::-1], 4), request.out
+    shape, out = (*request.window_size[::-1], 4), request.out
     with ExitStack() as stack:
         keep = stack.enter_context
         image = keep(runtime.result(shape, name="image", out=out))
@@ -43,10 +43,11 @@ def render_first_hits(vdi: VDI, request: FrameRequest, hit: FirstHit) -> NDArray
     prepared = prepared_vdi(runtime, vdi)
     with ExitStack() as stack:
         keep = stack.enter_context
-        image = keep(runtime.buffer(request.size[::-1], name="depth of first hits"))
+        image = keep(runtime.buffer(request.window_size[::-1], name="depth of first hits"))
         enqueue(Scene.of(prepared, request, keep, hit), image)
         t = runtime.download(image)
-    return (t + reference_depth(request.camera, vdi.bounds)).astype(np.float32)
+    rays = pixel_rays(request.camera, request.window_size, vdi.bounds)
+    return (t + rays.reference_depth).astype(np.float32)
 
 
 def enqueue(scene: Scene, image: DeviceBuffer) -> None:

@@ -54,9 +54,9 @@ class Scene:
         segments: bool = False,
     ) -> "Scene":
         """Make the rays of a frame, in buffers that are kept until it is drawn."""
-        camera, size, options = request.camera, request.size, request.options
+        camera, size, options = request.camera, request.window_size, request.options
         pixel_rays = rays.pixel_rays(camera, size, prepared.bounds)
-        coordinates = [pixel_rays.form(row[:3], row[3]) for row in prepared.list_rows]
+        coordinates = pixel_rays.forms(prepared.list_rows)
         # The opacity multiplier is in the lengths that kernels measure by these forms: a length
         # times m absorbs as m times the extinction
         direction = rays.direction_forms(pixel_rays, size, options.opacity_multiplier)
@@ -64,12 +64,11 @@ class Scene:
         # Keep what is in the bounds, in V_O's viewport and in front of its eye, and in the view
         u, v, _, denominator = coordinates
         wide, high = (edge / 2 * denominator for edge in prepared.window)
-        planes = rays.box_planes(pixel_rays, prepared.bounds)
+        planes = [*rays.box_planes(pixel_rays, prepared.bounds)]
         planes += [wide + u, wide - u, high + v, high - v]
         if not prepared.parallel:
             planes.append(denominator - prepared.nearest * np.eye(6)[0])
-        planes += rays.view_planes(camera, pixel_rays, options.clipping_planes)
-        planes += cut
+        planes += [*rays.view_planes(camera, pixel_rays, options.clipping_planes), *cut]
         forms = rays.packed([*coordinates, *direction, *planes, *beyond])
         upload, ends = prepared.runtime.upload, None
         opaque = rays.checked_opaque_depth(request.opaque_depth, size, pixel_rays)

@@ -145,7 +145,7 @@ class DeviceVolume:
         }
         self._lit: tuple[Camera, DeviceBuffer] | None = None
         if (asked := options.ambient_occlusion) is not None:
-            occlusion = OcclusionGrid.of(grid, asked)
+            occlusion = OcclusionGrid(grid, asked)
             if voxels.buffer is None:
                 raise DeviceMemoryError(
                     f"ambient occlusion needs the volume {volume.name!r} in one piece, "

@@ -71,15 +71,11 @@ class GridRays:
         """Return what the kernels march along in a view."""
         pixel_rays = rays.pixel_rays(camera, window_size, self.grid.bounds)
         to_index, points = rays.inverse_affine(self.grid.index_to_model), self.grid.dimensions
-        index = [pixel_rays.form(row[:3], row[3]) for row in to_index[:3]]
-        direction = [pixel_rays.form(axis) for axis in np.eye(3)]
-        planes = []
-        for form, n in zip(index, points, strict=True):
-            far = -form
-            far[0] += n - 1
-            planes += [form, far]
-        planes += rays.view_planes(camera, pixel_rays, clipping_planes)
-        reach = rays.largest_value(camera, window_size, self.grid.bounds, index)
+        index, direction = pixel_rays.forms(to_index[:3]), pixel_rays.forms(np.eye(3, 4))
+        far = -index
+        far[:, 0] += np.subtract(points, 1)
+        planes = [*index, *far, *rays.view_planes(camera, pixel_rays, clipping_planes)]
+        reach = rays.largest_value(pixel_rays, camera, window_size, self.grid.bounds, index)
         two_floats = reach > min(max(NEAR_ENTRY, ENTRY_PER_POINT * max(points)), FAR_ENTRY)
         return MarchForms([*index, *direction, *planes], pixel_rays, len(planes), two_floats)
 

@@ -355,14 +355,13 @@ def lighting_table(
 
 
 def _light(light: Light, camera: Camera) -> list[float]:
-    position, direction = light.in_world(camera)
-    to_view = camera.view_matrix
+    position, direction = light.in_view(camera)
     cone = math.cos(math.radians(light.cone_angle)) if light.cone_angle <= 90 else _NO_CONE
     return [
         *(light.intensity * c for c in (*light.ambient, *light.diffuse, *light.specular)),
-        *(to_view[:3, :3] @ direction),
+        *direction,
         float(light.positional),
-        *(to_view[:3, :3] @ position + to_view[:3, 3]),
+        *position,
         *light.attenuation,
         cone,
         light.exponent,

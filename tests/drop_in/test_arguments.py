@@ -150,7 +150,7 @@ case("scalars: values per cell", scalars=np.linspace(0, 1, 23**3) ** 2)
 
 for n in (0.5, 0.01, 10):
     case(f"opacity_unit_distance={n}", opacity_unit_distance=n)
-NO_LENGTH = ("positive length", "no opacity is reached over no length")
+NO_LENGTH = ("length in model units above 0", "no opacity is reached over no length")
 case("opacity_unit_distance=0", opacity_unit_distance=0, refused=NO_LENGTH)
 case("shade", shade=True, quick=True)
 case("shade and specular", shade=True, specular=1.0, specular_power=40.0)

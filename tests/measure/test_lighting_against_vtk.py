@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pyvista_vdi import api, compare_images, examples
-from pyvista_vdi.model.standard_cases import TRANSFER_FUNCTIONS, filling_camera
+from pyvista_vdi.model.standard_cases import filling_camera
 from pyvista_vdi.model.volume import Volume
 
 WINDOW = (480, 270)
@@ -30,9 +30,7 @@ def the_property(volume, case):
     from pyvista_vdi.vtk_pipeline.vtk import vtkPiecewiseFunction
 
     distance = volume.default_unit_distance
-    looks = Looks(
-        interpolation="linear", opacity_unit_distance=distance, **TRANSFER_FUNCTIONS["soft"]
-    )
+    looks = Looks(interpolation="linear", opacity_unit_distance=distance, cmap="bone")
     prop = looks.volume_property(looks.lookup_table(volume.array), rgba=volume.rgba)
     prop.shade = case.get("shade", False)
     prop.diffuse, prop.specular, prop.specular_power = 0.7, 0.2, 10.0

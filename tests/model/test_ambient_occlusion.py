@@ -11,7 +11,7 @@ from pyvista_vdi.model.options import GenerationOptions
 
 def grid_of(shape, radius, spacing=(1, 1, 1), direction=None):
     volume = Volume(np.zeros(shape[::-1], np.uint8), spacing, direction=direction)
-    return volume, OcclusionGrid.of(volume, AmbientOcclusion(radius))
+    return volume, OcclusionGrid(volume, AmbientOcclusion(radius))
 
 
 def test_every_voxel_lies_between_nodes_and_every_step_within_the_margin():

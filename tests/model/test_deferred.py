@@ -85,7 +85,7 @@ def test_classification_is_the_mean_over_values_of_that_mean_and_spread(default_
     given["spread"] = np.minimum(given["spread"], np.sqrt(most) * 0.999)
     made = kept_values(**given)
     vdi = made.classified(transfer_function=LOOKS)
-    length, at, kinds = lengths_of(made.lists), 0, set()
+    length, at, kinds = lengths_of(made), 0, set()
     for k in range(made.n_supersegments):
         mean, spread = float(made.mean[k]), float(made.spread[k])
         low, high, *shares = spread_of_values(mean, spread)

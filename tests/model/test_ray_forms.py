@@ -68,8 +68,8 @@ def test_a_far_eye_or_origin_costs_float32_nothing(far, extent, parallel):
     np.testing.assert_allclose(points_on_rays(made, a, b, depth), points, rtol=0, atol=slack)
     # Relative to the bounds, float32 has ten roundings of numbers of a few extents
     t = depth - made.reference_depth
-    for axis in range(3):
-        found = in_float32(made.form(np.eye(3)[axis], -low[axis]), a, b, t)
+    for axis, form in enumerate(made.forms(np.column_stack([np.eye(3), -low]))):
+        found = in_float32(form, a, b, t)
         error = np.abs(found - (points - low)[:, axis])
         assert error.max() <= 64 * 2.0**-24 * extent + slack
 

@@ -19,10 +19,7 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.options import (
-    MAX_PREVIEW_SAMPLES,
-    RenderOptions,
-)
+from pyvista_vdi.model.options import MAX_PREVIEW_SAMPLES, RenderOptions
 from pyvista_vdi.model.packing import DEPTH_CODES
 
 pytestmark = pytest.mark.fast
@@ -90,8 +87,8 @@ def long_list(count):
 #: for each check.
 REFUSED = {
     AmbientOcclusion: [
-        ({"radius": 0}, "a positive length in model units; got 0"),
-        ({"radius": "far"}, "a positive length in model units; got 'far'"),
+        ({"radius": 0}, "a length in model units above 0; got 0"),
+        ({"radius": "far"}, "a length in model units above 0; got 'far'"),
         ({"strength": NAN}, "strength .* from 0 to 1; got nan"),
         ({"directions": 11}, "from 12 to 4096; got 11"),
     ],
@@ -111,7 +108,7 @@ REFUSED = {
         ({"opacity_multiplier": -1}, "opacity_multiplier"),
         ({"preview_samples": "8"}, "preview_samples must be .* got '8'"),
         ({"preview_samples": MAX_PREVIEW_SAMPLES + 1}, "preview_samples must be"),
-        ({"transmittance_cutoff": 1}, "transmittance_cutoff must be a number from 0"),
+        ({"transmittance_cutoff": 1}, "transmittance_cutoff must be a share of the light from 0"),
     ],
     TransferFunction: [
         ({"opacities": [0.5]}, "as many opacities as colors; got 1 and 2"),
@@ -124,7 +121,7 @@ REFUSED = {
         ({"scalar_range": (3, 1)}, r"\(clim\) must be two finite numbers, the smaller first"),
         ({"scalar_range": (0, INF)}, "must be two finite numbers"),
         ({"scalar_range": ("a", "b")}, "must be two finite numbers"),
-        ({"unit_distance": 0}, "unit_distance must be a positive length in model units; got 0"),
+        ({"unit_distance": 0}, "unit_distance must be a length in model units above 0; got 0"),
         ({"unit_distance": "x"}, "unit_distance .* got 'x'"),
         ({"interpolation": "cubic"}, "interpolation must be 'nearest' or 'linear'; got 'cubic'"),
     ],

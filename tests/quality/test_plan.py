@@ -10,8 +10,7 @@ import pytest
 
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.view import View
-from pyvista_vdi.quality.costs import Costs
-from pyvista_vdi.quality.plan import Made, Making, Plan, Seen, ViewEstimate, plan
+from pyvista_vdi.quality.plan import Costs, Made, Making, Plan, Seen, ViewEstimate, plan
 
 BOUNDS = (-1.0, 1.0) * 3
 HOME = View(Camera((0, 0, 9), (0, 0, 0), (0, 1, 0)), (320, 180))

@@ -109,7 +109,7 @@ def test_limits_are_kept_and_what_cannot_be_is_said(default_runtime, ladder):
         ({"quality": "best"}, "one of reference, high, balanced and fast; got 'best'"),
         ({"target_ssim": 1.0}, "target_ssim must be an SSIM between 0 and 1; got 1.0"),
         ({"full_fps": math.inf}, "full_fps must be"),
-        ({"max_bytes": -1}, "max_bytes must be a whole number of bytes above 0; got -1"),
+        ({"max_bytes": -1}, "max_bytes must be a whole number of bytes, 1 or above; got -1"),
         ({"quality": "fast", "target_ssim": 0.9}, "each say how good pictures are"),
         ({"quality": "reference", "max_bytes": 10}, "'reference' and max_bytes=10 each say"),
         ({"quality": "fast", "max_supersegments": 7}, "'fast' chooses .* max_supersegments=7"),

@@ -275,7 +275,7 @@ def node_occlusion(
     if ambient_occlusion is None:
         return None
     step = min(volume.spacing) / 2 if sample_distance is None else sample_distance
-    grid = OcclusionGrid.of(volume, ambient_occlusion)
+    grid = OcclusionGrid(volume, ambient_occlusion)
     depth = _optical_depth(volume, transfer_function)
     return NodeOcclusion(volume, grid, depth, step, ambient_occlusion.strength)
 

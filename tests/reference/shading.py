@@ -55,7 +55,7 @@ def lit_colors(
     the transfer function, float64 (n, 3).
     """
     to_model = volume.index_to_model
-    to_world = camera.model_transform @ to_model
+    to_view = camera.model_to_view @ to_model
     if lights.headlight_only:
         # Angles are those of the model frame, whatever the actor's matrix does to them
         (light,) = lights.lights
@@ -70,7 +70,7 @@ def lit_colors(
         specular = shading.specular * highlight[:, None] * np.array(light.specular)
         sent = shading.ambient * color + np.where(facing[:, None] > 0, diffuse + specular, 0.0)
     else:
-        sent = _by_lights(camera, shading, lights, to_world, position, differences, color)
+        sent = _by_lights(camera, shading, lights, to_view, position, differences, color)
     return np.clip(sent, 0.0, 1.0)
 
 
@@ -78,19 +78,19 @@ def _by_lights(
     camera: Camera,
     shading: Shading,
     lights: Lights,
-    to_world: Array,
+    to_view: Array,
     position: Array,
     differences: Array,
     color: Array,
 ) -> Array:
-    world = position @ to_world[:3, :3].T + to_world[:3, 3]
-    normal = _normals(to_world, differences)
-    view = _unit(world - camera.position)
+    place = position @ to_view[:3, :3].T + to_view[:3, 3]
+    normal = _normals(to_view, differences)
+    view = _unit(place)
     ambient = np.zeros(3)
     diffuse, specular = np.zeros_like(color), np.zeros_like(color)
     for light in lights.lights:
         ambient = ambient + light.intensity * np.array(light.ambient)
-        direction, strength = _arriving(light, camera, world)
+        direction, strength = _arriving(light, camera, place)
         strength = strength * light.intensity
         facing = (normal * direction).sum(axis=1)
         if lights.two_sided:
@@ -110,13 +110,13 @@ def _by_lights(
     )
 
 
-def _arriving(light: Light, camera: Camera, world: Array) -> tuple[Array, Array]:
+def _arriving(light: Light, camera: Camera, place: Array) -> tuple[Array, Array]:
     """Return the unit direction in which light arrives, (n, 3), and its strength, (n,)."""
-    origin, axis = light.in_world(camera)
+    origin, axis = light.in_view(camera)
     if not light.positional:
-        return np.broadcast_to(axis, world.shape), np.ones(len(world))
-    distance = np.linalg.norm(world - origin, axis=1)
-    direction = _unit(world - origin)
+        return np.broadcast_to(axis, place.shape), np.ones(len(place))
+    distance = np.linalg.norm(place - origin, axis=1)
+    direction = _unit(place - origin)
     a, b, c = light.attenuation
     strength = 1 / (a + b * distance + c * distance**2)
     if light.cone_angle <= 90:

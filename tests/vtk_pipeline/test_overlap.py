@@ -138,5 +138,5 @@ def test_nothing_is_left_and_what_is_out_of_the_picture_is_not_generated():
     away = add_ball(plotter, 1, place=(60.0, 60.0, 0.0))
     plotter.camera_position = CAMERA
     plotter.show(auto_close=False)
-    assert away.mapper.GetSource().last() is None
+    assert away.mapper.GetSource().last is None
     plotter.close()

@@ -261,7 +261,7 @@ def test_every_frame_is_as_with_vtks_mapper(seed, expected_messages):
         story.append(name)
         for chain in chains:
             getattr(chain, name)(np.random.default_rng(drawn))
-        if way == "vdi" and ours.first.last() is not None:  # it serves the view it is of
+        if way == "vdi" and ours.first.last is not None:  # it serves the view it is of
             ours.first.SetCamera(ours.renderer.GetActiveCamera())
             ours.first.SetWindowSize(ours.renderer.GetSize())
         assert_same(ours, judge, "; ".join(story))

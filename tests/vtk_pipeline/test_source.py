@@ -125,11 +125,11 @@ def test_an_abort_leaves_nothing_half_done_and_the_next_update_works(when):
     downstream = behind(source)
     downstream.Update()  # from C++: nothing is raised, and nothing written
     assert downstream.GetOutput().GetNumberOfPoints() == 0
-    assert source.last() is before
+    assert source.last is before
     with pytest.raises(errors.Cancelled):
         source.Update()
     assert source.GetOutputDataObject(0).GetNumberOfPoints() == 0
-    assert source.last() is before
+    assert source.last is before
     source.RemoveObserver(tag)
     downstream.Update()  # nothing was modified
     assert downstream.GetOutput().GetNumberOfPoints() == SIZE[0] * SIZE[1]

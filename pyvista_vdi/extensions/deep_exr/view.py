@@ -87,10 +87,9 @@ def bounds_of_lists(
     to_model = np.linalg.inv(camera.model_to_view)
     if not counts.any():
         return np.repeat(to_model[:3, 3], 2)
-    rows, columns = (np.flatnonzero(counts.any(axis=axis)) for axis in (1, 0))
     u, v = (
-        2 * np.array((filled[0], filled[-1] + 1)) / n - 1
-        for filled, n in ((columns, counts.shape[1]), (rows, counts.shape[0]))
+        2 * (np.flatnonzero(filled)[[0, -1]] + (0, 1)) / filled.size - 1
+        for filled in (counts.any(axis=0), counts.any(axis=1))
     )
     corners = np.array([(1, a, b) for a in u for b in v])
     origin, direction = camera.ray_coefficients(counts.shape[::-1])

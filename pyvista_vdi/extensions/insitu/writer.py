@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from functools import partial
 from typing import Any
@@ -38,7 +39,7 @@ from pyvista_vdi.model.volume import Grid, Volume
 _RECORDS = (Classification, Deferral, GenerationOptions)
 
 
-class InSitu:
+class InSitu(AbstractContextManager["InSitu"]):
     """Writes a series of VDIs of a simulation while it runs. All ranks call it together.
 
     Parameters
@@ -124,11 +125,11 @@ class InSitu:
         self._writer: SeriesWriter | None = None
         self.seconds: list[float] = []
         with together(comm, "InSitu", InvalidArgumentError):
-            steps = Number("a whole number of steps from 1", 1, whole=True, name="every")
+            steps = Number("a whole number of steps", 1, whole=True, name="every")
             self._every = steps(every)
             self._camera = Camera.from_any(camera)
             self._size = check_window_size(window_size)
-            count = Number("three whole numbers of points from 2", 2, whole=True, name="dimensions")
+            count = Number("three whole numbers of points", 2, whole=True, name="dimensions")
             x, y, z = map(count, as_vector(dimensions, "dimensions"))
             of = Volume(np.zeros((2, 2, 2), np.uint8), spacing, origin)  # checks them
             self._grid = asdict(Grid((x, y, z), of.spacing, of.origin, of.direction))
@@ -241,9 +242,6 @@ class InSitu:
         self._closed = True
         if self._writer is not None:
             self._writer.close()
-
-    def __enter__(self) -> InSitu:
-        return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is not None:  # maybe on this rank alone

@@ -5,5 +5,5 @@ from __future__ import annotations
 from pyvista_vdi.registry import Extension
 
 EXTENSION = Extension(
-    generators={"blocks": "pyvista_vdi.extensions.large.generate:generate_in_blocks"}
+    methods={"generating by blocks": "pyvista_vdi.extensions.large.generate:generate_in_blocks"}
 )

@@ -48,8 +48,9 @@ class Blocks:
     after: int
 
     @classmethod
-    def of(cls, grid: Grid, cuts: Sequence[Sequence[int]], function: TransferFunction) -> Blocks:
+    def of(cls, of: Grid, cuts: Sequence[Sequence[int]], function: TransferFunction) -> Blocks:
         """Return blocks for a classification: gradients look a point before and three behind."""
+        grid = Grid(of.dimensions, of.spacing, of.origin, of.direction, of.unit_distance)
         gradients = function.shading or function.gradient_opacities is not None
         return cls(grid, tuple(map(tuple, cuts)), *((1, 3) if gradients else (0, 1)))
 

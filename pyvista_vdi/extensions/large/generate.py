@@ -24,7 +24,6 @@ from pyvista_vdi.model.options import GenerationRequest
 from pyvista_vdi.model.packing import Arrays
 from pyvista_vdi.model.types import ClientLike
 from pyvista_vdi.model.vdi import VDI, made_vdi
-from pyvista_vdi.model.volume import Grid
 
 #: Blocks that would fit into a limit of memory: beside one there are lists, and its halo.
 _BLOCKS_IN_LIMIT = 4
@@ -49,7 +48,7 @@ def generate_in_blocks(
         block_bytes = min(block_bytes, limit // _BLOCKS_IN_LIMIT)
     array: Any = volume.array
     cuts = cuts_of(array.shape, array.chunks, array.dtype.itemsize, block_bytes)
-    blocks = Blocks.of(Grid.of(volume), cuts, request.transfer_function)
+    blocks = Blocks.of(volume, cuts, request.transfer_function)
     gradients = request.transfer_function.gradient_opacities is not None
     scalars = volume.finite_range() if gradients else (np.nan, np.nan)  # nothing else asks
     task = Task.of(blocks, request, scalars)
@@ -89,7 +88,7 @@ def _generated(request: GenerationRequest, task: Task, workers: Any) -> VDI:
     order = task.to_read(windows)
     values = dict(zip(order, workers.values(map(blocks.own, order)), strict=True))
     first = workers.map("first-pass", task.first_pass, order, order, values.values(), share=0.4)
-    seen = workers.results(workers.map("seen", BlockSummary.without_faces, order, first.values()))
+    seen = workers.map("seen", BlockSummary.without_faces, order, first.values(), fetch=True)
     entering = task.light_entering(windows, seen)
 
     # Make the lists of each block in which something may be seen
@@ -115,7 +114,7 @@ def _generated(request: GenerationRequest, task: Task, workers: Any) -> VDI:
         columns = [pieces[at] for at in met], [y0] * len(met), [y1] * len(met)
         rows.append(workers.map("rows", Piece.rows, [(*at, y0) for at in met], *columns).values())
     of_ranges = *zip(*ranges, strict=True), *zip_longest(*rows)
-    merged = workers.results(workers.map("merge", task.merge, ranges, *of_ranges, share=0.2))
+    merged = workers.map("merge", task.merge, ranges, *of_ranges, share=0.2, fetch=True)
     return vdi_of(task, request, [merged[at] for at in ranges], workers.device_name)
 
 
@@ -164,6 +163,7 @@ class _Here:
         places: Sequence[tuple[int, ...]],
         *columns: Iterable[Any],
         share: float = 0.0,
+        fetch: bool = False,
     ) -> dict[Any, Any]:
         """Return what a function returns for each place, of its arguments; ``share`` of all."""
         found = {}
@@ -172,8 +172,4 @@ class _Here:
             if share:
                 self._done = min(self._done + share / len(places), 1.0)
                 report(self._progress, self._done)
-        return found
-
-    def results(self, found: dict[Any, Any]) -> dict[Any, Any]:
-        """Return what :meth:`map` has found: it is here."""
         return found

@@ -13,7 +13,7 @@ import threading
 import uuid
 import weakref
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 from distributed import CancelledError, Client, Future, KilledWorker, as_completed, get_worker
@@ -34,7 +34,7 @@ _RANGES_PER_WORKER = 4
 _one_block = threading.Lock()
 
 
-class Cluster:
+class Cluster(AbstractContextManager["Cluster"]):
     """Has the workers of a Dask cluster do the parts of a task; what they lack is refused."""
 
     def __init__(self, client: Client, request: GenerationRequest, task: Task) -> None:
@@ -43,9 +43,9 @@ class Cluster:
         self._progress, self._done = request.progress, 0.0
         self._token, self._stage = uuid.uuid4().hex[:12], 0
         self._futures: weakref.WeakSet[Future[Any]] = weakref.WeakSet()  # that are still wanted
-        self._lazy = array.lazy
+        self._array = array.array
         files = [str(path) for path in array.files]
-        self._sent = None if array.lazy is not None else (dumps(array), files)
+        self._sent = None if array.lazy else (dumps(array), files)
         answers = client.run(_able, request.device, files, on_error="return")
         if not answers:
             raise NoDeviceError("the cluster has no workers: start some, or wait for them")
@@ -58,9 +58,6 @@ class Cluster:
         self.ranges = _RANGES_PER_WORKER * len(answers)
         self.device_name = ", ".join(sorted(set(answers.values())))
 
-    def __enter__(self) -> Cluster:
-        return self
-
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is not None:
             self._client.cancel(list(self._futures), force=True)
@@ -69,7 +66,7 @@ class Cluster:
         """Return what reads the volume's values in boxes, or, if Dask computes them, futures."""
         if self._sent is not None:
             return [functools.partial(_read, *self._sent, box) for box in boxes]
-        futures = self._client.compute([self._lazy[box] for box in boxes])
+        futures = self._client.compute([self._array[box] for box in boxes])
         self._futures.update(futures)
         return list(futures)
 
@@ -80,10 +77,12 @@ class Cluster:
         places: Sequence[tuple[int, ...]],
         *columns: Iterable[Any],
         share: float = 0.0,
+        fetch: bool = False,
     ) -> dict[Any, Any]:
         """Return futures of what a function returns for each place, of its arguments.
 
-        Those that are a ``share`` of the whole are waited for.
+        Those that are a ``share`` of the whole are waited for. ``fetch``: return what they hold,
+        made again if it was lost meanwhile.
         """
         self._stage += 1
         futures = self._client.map(
@@ -104,12 +103,9 @@ class Cluster:
                     future.result()
             self._done = min(self._done + share / len(places), 1.0)
             report(self._progress, self._done)
-        return dict(zip(places, futures, strict=True))
-
-    def results(self, found: dict[Any, Any]) -> dict[Any, Any]:
-        """Return what futures hold, made again if it was lost meanwhile."""
         with self._naming(None):
-            return dict(zip(found, self._client.gather(list(found.values())), strict=True))
+            found = self._client.gather(futures) if fetch else futures
+        return dict(zip(places, found, strict=True))
 
     @contextmanager
     def _naming(self, at: tuple[int, ...] | None) -> Iterator[None]:

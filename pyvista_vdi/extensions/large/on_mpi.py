@@ -193,7 +193,7 @@ def _blocks(
     boxes = comm.allgather((grid.first[::-1], grid.array.shape[:3]))
     begins = (sorted({begin[axis] for begin, _ in boxes}) for axis in range(3))
     cuts = tuple((*of_axis, n) for of_axis, n in zip(begins, grid.dimensions[::-1], strict=True))
-    blocks, ranks = Blocks.of(Grid.of(grid), cuts, function), {}
+    blocks, ranks = Blocks.of(grid, cuts, function), {}
     for rank, (begin, points) in enumerate(boxes):
         z, y, x = (of_axis.index(at) for of_axis, at in zip(cuts, begin, strict=True))
         ends = [part.stop for part in blocks.own((z, y, x))]

@@ -13,11 +13,6 @@ EXTENSION = Extension(
     formats=(
         FileFormat(".vdis", "pyvista_vdi.extensions.series.series", "series", head="series.json"),
     ),
-    shown={
-        "pyvista_vdi.extensions.series.series:VDISeries": (
-            "pyvista_vdi.extensions.series.shown:SeriesInput"
-        )
-    },
     verbs=(
         Verb(
             "series",

@@ -6,7 +6,7 @@ import io
 import os
 import weakref
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -30,10 +30,34 @@ from pyvista_vdi.registry import FileFormat
 VERSION = 1
 #: VDIs that are kept of those that were read: the last ones.
 _KEPT = 6
+#: Name of a VDI's file, by its number.
+VDI_NAME = "{:06}.vdi"
 SERIES = EXTENSION.formats[0]
 
 
-class Archive(Sequence[Any]):
+class Called(Sequence[Any]):
+    """What a function makes of each item of a sequence, when it is asked for.
+
+    ``kept``: how many are kept of those that were asked for last. It is pickled as what it is
+    made from.
+    """
+
+    def __init__(self, function: Callable[[Any], Any], items: Sequence[Any], kept: int = 0) -> None:
+        self._given: tuple[Any, ...] = function, items, kept
+        self._length = len(items)
+        self._made = lru_cache(kept)(lambda i: function(items[i]))
+
+    def __reduce__(self) -> Any:
+        return type(self), self._given
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._made(range(self._length)[index])
+
+
+class Archive(Called):
     """The VDIs of a folder, a ZIP or a page: each is read when it is asked for, from any thread.
 
     It is pickled as its path and format. ``about`` is what the JSON says.
@@ -42,12 +66,11 @@ class Archive(Sequence[Any]):
     def __init__(self, path: str | os.PathLike[str], kind: FileFormat) -> None:
         self.path, self._kind = as_path(path).absolute(), kind
         self._root: Any = self.path if self.path.is_dir() else zipfile.Path(self._opened())
-        self._read = lru_cache(_KEPT)(lambda i: self._file(i, reader.read))
         content = self._content(kind.head)
         try:
             self.about: dict[str, Any] = from_json(content)
             form, version = self.about["format"], self.about["version"]
-            self._length = len(self.about["times" if kind == SERIES else "views"])
+            count = len(self.about["times" if kind == SERIES else "views"])
         except (KeyError, TypeError, ValueError, RecursionError) as error:
             self.refuse(f"its {kind.head} is incomplete ({error!r})")
         if (form, version) != (f"pyvista-vdi-{kind.holds}", VERSION):
@@ -56,15 +79,8 @@ class Archive(Sequence[Any]):
                 f"reads 'pyvista-vdi-{kind.holds}', version {VERSION}: upgrade by pip install -U "
                 "pyvista-vdi"
             )
-
-    def __reduce__(self) -> Any:
-        return type(self), (self.path, self._kind)
-
-    def __len__(self) -> int:
-        return self._length
-
-    def __getitem__(self, index: Any) -> Any:
-        return self._read(range(len(self))[index])
+        super().__init__(self._file, range(count), _KEPT)
+        self._given = self.path, kind
 
     def info(self) -> FileInfo:
         """Return what is known of the first VDI without its arrays, and the bytes of all."""
@@ -80,12 +96,8 @@ class Archive(Sequence[Any]):
 
     def _opened(self) -> zipfile.ZipFile:
         """Return the file as an archive, or say what it is instead of one."""
-        try:
-            stream = opened(self.path)
-            weakref.finalize(self, stream.close)
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise VDIFileError(f"{self.path} cannot be read: {reason}") from error
+        stream = opened(self.path)
+        weakref.finalize(self, stream.close)
         try:
             archive = zipfile.ZipFile(stream)
         except reader.ARCHIVE_ERRORS as error:
@@ -106,14 +118,10 @@ class Archive(Sequence[Any]):
         except reader.ARCHIVE_ERRORS as error:
             self.refuse(f"its {name} cannot be read ({error})")
 
-    def _file(self, i: int, read: Any) -> Any:
+    def _file(self, i: int, read: Any = reader.read) -> Any:
         """Return what a function of the reader of ``.vdi`` files makes of one of the VDIs."""
-        return read(self.path / name_of(i), stream=io.BytesIO(self._content(name_of(i))))
-
-
-def name_of(i: int) -> str:
-    """Return the name of a VDI's file by its number."""
-    return f"{i:06}.vdi"
+        name = VDI_NAME.format(i)
+        return read(self.path / name, stream=io.BytesIO(self._content(name)))
 
 
 def head_bytes(kind: FileFormat, about: Mapping[str, Any]) -> bytes:
@@ -146,8 +154,8 @@ def write_to(
     stream: IO[bytes],
     vdis: Any,
     *,
+    precision: str,
     progress: Progress | None = None,
-    precision: str = "8-byte",
     compression: str = "zstd",
     level: int | None = None,
 ) -> int:
@@ -160,7 +168,7 @@ def write_to(
         for i in range(len(vdis)):
             vdi, file = vdis[i].with_precision(precision), io.BytesIO()
             writer.write_to(file, vdi, compression, level, coarse=False)
-            archive.writestr(writer.stored(name_of(i)), file.getvalue())
+            archive.writestr(writer.stored(VDI_NAME.format(i)), file.getvalue())
             first = first or stream.tell()
             done()
     return first

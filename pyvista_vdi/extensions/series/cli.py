@@ -11,7 +11,7 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
-from pyvista_vdi.cli.generate import as_seen, generating_view
+from pyvista_vdi.cli.generate import as_seen, generating_view, say_vdi
 from pyvista_vdi.cli.inputs import (
     LOOK,
     OF_VOLUMES,
@@ -22,16 +22,14 @@ from pyvista_vdi.cli.inputs import (
     refuse,
 )
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
-from pyvista_vdi.cli.text import printable
 from pyvista_vdi.errors import InvalidArgumentError, naming
+from pyvista_vdi.extensions.series.archive import Called
 from pyvista_vdi.extensions.series.generate import StepMaker
-from pyvista_vdi.extensions.series.series import Called, VDISeries, check_range
+from pyvista_vdi.extensions.series.series import VDISeries, check_range
 from pyvista_vdi.io import read, read_info
 from pyvista_vdi.io.files import holds
-from pyvista_vdi.model.arguments import records_of
 from pyvista_vdi.model.checks import as_number
-from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
+from pyvista_vdi.model.options import Deferral, GenerationOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 from pyvista_vdi.plotting.progress import DelayedBar
@@ -48,7 +46,7 @@ def series(options: argparse.Namespace) -> int:
     if len(kinds) > 1:
         raise InvalidArgumentError("the files are VDIs or volumes, and not some of each")
     if of_vdis:
-        refuse(options, (*_OF_VOLUMES, "scheduler", *declared(Deferral)), "volumes")
+        refuse(options, (*_OF_VOLUMES, "scheduler", *Deferral.declared), "volumes")
         known = (as_number(read_info(file).metadata.get("time")) for file in files)
         steps = [Step(f, t, partial(read, f)) for f, t in zip(files, known, strict=True)]
     else:
@@ -65,9 +63,7 @@ def series(options: argparse.Namespace) -> int:
     # Refuse what cannot be before a volume is read
     times = _times(steps) if options.times is None else options.times
     vdis = VDISeries(Called(vdi_of, range(len(steps))), times)
-    look = classification(options)
-    records_of(look, "series", Classification)
-    how = look | given(options, GenerationOptions, Deferral)
+    how = classification(options) | given(options, GenerationOptions, Deferral)
     check_writable(with_suffix(Path(options.output), (".vdis",), "a series"))
     with closing(DelayedBar(label="writing a series")) as bar:
         with naming(steps[0].name):
@@ -76,10 +72,8 @@ def series(options: argparse.Namespace) -> int:
             view = generating_view(options, first)
             how |= {"device": options.device, "client": options.scheduler}
             make = StepMaker("series", view, options.size, **how)
-        how = {"precision": "8-byte", **file_options(options)}
-        target = vdis.save(options.output, progress=bar, **how)
-    size = f"{target.stat().st_size / 2**20:.1f} MiB"
-    print(f"{printable(options.output)}: {len(vdis)} steps, {size}")
+        vdis.save(options.output, progress=bar, **file_options(options))
+    say_vdi(options, f"{len(vdis)} steps")
     return 0
 
 
@@ -100,7 +94,7 @@ times   A,B,...  of the steps, ascending (default: those in the files, else 0,1,
 [file]
 compression  {zstd,lz4,deflate,none}  by default zstd
 compression_level
-precision    {8-byte,exact}  of the supersegments (default: 8-byte)
+precision=8-byte  {8-byte,exact}  of the supersegments
 [volumes] What VDIs are made of them; not for VDIs.
 spacing origin level channel series time_index size=1280x720 max_supersegments sample_distance
 memory_limit scheduler

@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.api import generate
-from pyvista_vdi.errors import (
-    InvalidArgumentError,
-    InvalidArgumentTypeError,
-    naming,
-)
-from pyvista_vdi.extensions.series.series import Called, VDISeries, checked_times
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, naming
+from pyvista_vdi.extensions.series.archive import Called
+from pyvista_vdi.extensions.series.series import VDISeries, checked_times
 from pyvista_vdi.io.progress import Pieces
 from pyvista_vdi.io.stores import StoredVolume
 from pyvista_vdi.model.arguments import records_of
@@ -46,17 +43,16 @@ def generate_series(
 
     Parameters
     ----------
-    volumes : iterable or VTK source
-        The steps: each what :func:`pyvista_vdi.generate` takes. They are taken one by one. Or a VTK
-        or PyVista source that has time steps; or what :func:`pyvista_vdi.read_volume` returned for
-        a store that has. Of a multi-scale store, steps are of the level that the view requires,
-        unless another was asked for.
+    volumes : iterable
+        The steps: each what :func:`pyvista_vdi.generate` takes. They are taken one by one. Or what
+        :func:`pyvista_vdi.read_volume` returned for a store that has time steps. Of a multi-scale
+        store, steps are of the level that the view requires, unless another was asked for.
     camera : pyvista.Camera or vtkCamera or Camera
         The generating view V_O.
     window_size : (int, int)
         Width and height in pixels.
     times : iterable of float, optional
-        Of the steps, ascending; those of a source or a store, else 0, 1, 2 … by default.
+        Of the steps, ascending; those of a store, else 0, 1, 2 … by default.
     client : distributed.Client, optional
         As for :func:`pyvista_vdi.generate`: of a Dask cluster, whose workers make the VDIs of
         chunked volumes.
@@ -90,13 +86,23 @@ def generate_series(
     --------
     generate : has the options, and the other errors.
     """
-    steps, known = _steps(volumes, times)
+    if isinstance(volumes, StoredVolume) and len(volumes.store.times) > 1:
+        times = volumes.store.times if times is None else times
+        volumes = Called(volumes.at_time, range(len(volumes.store.times)))
+    known = None if times is None else checked_times(times)
+    single = isinstance(volumes, Volume | str | bytes) or hasattr(volumes, "GetClassName")
+    if single or not np.iterable(volumes):
+        raise InvalidArgumentTypeError(
+            f"volumes must be volumes, one for each step; got {type(volumes).__name__}: pass a list"
+        )
+    if known is not None and isinstance(volumes, Sized) and len(volumes) != len(known):
+        raise InvalidArgumentError(f"there are {len(volumes)} steps and {len(known)} times")
     where = {"client": client, "device": device}
     make = StepMaker("generate_series", camera, window_size, **where, **options)
-    sized: Any = steps if known is None else known
+    sized: Any = volumes if known is None else known
     done = Pieces(progress, len(sized) if isinstance(sized, Sized) else 0)
     vdis: list[VDI] = []
-    for volume in islice(steps, None if known is None else len(known) + 1):  # one is too many
+    for volume in islice(volumes, None if known is None else len(known) + 1):  # one is too many
         with naming(f"step {len(vdis)}"):
             vdis.append(make(volume))
         done()
@@ -139,23 +145,3 @@ class StepMaker:
         if isinstance(vdi, DeferredVDI):
             self._options["value_range"] = vdi.value_range
         return vdi  # type: ignore[no-any-return]
-
-
-def _steps(
-    volumes: Any, times: Iterable[float] | None
-) -> tuple[Iterable[Any], tuple[float, ...] | None]:
-    """Return the steps' volumes, and their times where they are known."""
-    own: Iterable[float] | None = None
-    if isinstance(volumes, StoredVolume) and len(volumes.store.times) > 1:
-        own = volumes.store.times
-        volumes = Called(volumes.at_time, range(len(volumes.store.times)))
-    times = own if times is None else times
-    known = None if times is None else checked_times(times)
-    single = isinstance(volumes, Volume | str | bytes) or hasattr(volumes, "GetClassName")
-    if single or not np.iterable(volumes):
-        raise InvalidArgumentTypeError(
-            f"volumes must be volumes, one for each step; got {type(volumes).__name__}: pass a list"
-        )
-    if known is not None and isinstance(volumes, Sized) and len(volumes) != len(known):
-        raise InvalidArgumentError(f"there are {len(volumes)} steps and {len(known)} times")
-    return volumes, known

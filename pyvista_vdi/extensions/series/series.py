@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import os
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, overload
 
@@ -17,7 +18,7 @@ from pyvista_vdi.errors import (
     InvalidVDIError,
     VDIFileError,
 )
-from pyvista_vdi.extensions.series.archive import SERIES, Archive
+from pyvista_vdi.extensions.series.archive import SERIES, Archive, Called
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera
@@ -27,7 +28,21 @@ from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 
 
-class VDISeries(VDICollection):
+class Several(VDICollection):
+    """The VDIs of a series or a set, at hand, or made or read when they are asked for."""
+
+    _vdis: Any
+
+    def __len__(self) -> int:
+        return len(self._vdis)
+
+    def _mapped(self, function: Callable[[VDI], VDI]) -> Any:
+        found = copy.copy(self)
+        found._vdis = Called(function, self, kept=8)
+        return found
+
+
+class VDISeries(Several):
     """The VDIs of one scene at several times: a sequence of :class:`VDI` or :class:`DeferredVDI`.
 
     Made by :func:`pyvista_vdi.generate_series`, by :func:`pyvista_vdi.read` of a ``.vdis`` folder
@@ -56,29 +71,26 @@ class VDISeries(VDICollection):
     """
 
     times: tuple[float, ...]
-    kind = SERIES
+    kind, drawn_by = SERIES, "pyvista_vdi.extensions.series.shown:SeriesInput"
 
     def __init__(self, steps: Iterable[VDI], times: Iterable[float] | None = None) -> None:
-        self._steps = as_steps(steps, "a series")
-        self.times = checked_times(range(len(self._steps)) if times is None else times)
-        if not len(self._steps) == len(self.times) > 0:
+        self._vdis = as_steps(steps, "a series")
+        self.times = checked_times(range(len(self)) if times is None else times)
+        #: What a file says of it beside its steps.
+        self.about = {"times": self.times}
+        if not len(self) == len(self.times) > 0:
             raise InvalidArgumentError(
-                f"a series has a time for each step, and at least one; got {len(self._steps)} "
+                f"a series has a time for each step, and at least one; got {len(self)} "
                 f"steps and {len(self.times)} times"
             )
 
     @cached_property
     def _first(self) -> Any:
         """The first step, or what its file says of it."""
-        return self._steps.info() if isinstance(self._steps, Archive) else self[0]
+        return self._vdis.info() if isinstance(self._vdis, Archive) else self[0]
 
     @property
-    def about(self) -> dict[str, Any]:
-        """What a file says of it beside its steps."""
-        return {"times": self.times}
-
-    @property
-    def camera(self) -> Camera:
+    def camera(self) -> Camera:  # type: ignore[override]
         """The generating view V_O of the first step."""
         return self._first.camera  # type: ignore[no-any-return]
 
@@ -92,21 +104,15 @@ class VDISeries(VDICollection):
         """The first step's bounds in the model frame."""
         return self._first.bounds  # type: ignore[no-any-return]
 
-    def __len__(self) -> int:
-        return len(self.times)
-
     @overload
     def __getitem__(self, index: int) -> VDI: ...
     @overload
     def __getitem__(self, index: slice) -> VDISeries: ...
     def __getitem__(self, index: int | slice) -> VDI | VDISeries:
         if isinstance(index, slice):
-            chosen = Called(self._steps.__getitem__, range(len(self))[index])
+            chosen = Called(self._vdis.__getitem__, range(len(self))[index])
             return VDISeries(chosen, self.times[index])
-        return self._steps[self._place(index, "steps")]  # type: ignore[no-any-return]
-
-    def _mapped(self, function: Callable[[VDI], VDI]) -> VDISeries:
-        return VDISeries(Called(function, self, kept=8), self.times)
+        return self._vdis[self._place(index, "steps")]  # type: ignore[no-any-return]
 
     def nearest(self, time: float) -> int:
         """Return the index of the step whose time is nearest; of two, the earlier.
@@ -153,27 +159,6 @@ def read_info(path: str | os.PathLike[str]) -> FileInfo:
     return Archive(path, SERIES).info()
 
 
-class Called(Sequence[Any]):
-    """What a function makes of each item of a sequence, when it is asked for.
-
-    ``kept``: how many are kept of those that were asked for last. It is pickled as what it is
-    made from.
-    """
-
-    def __init__(self, function: Callable[[Any], Any], items: Sequence[Any], kept: int = 0) -> None:
-        self._given = function, items, kept
-        self._made = lru_cache(kept)(lambda i: function(items[i]))
-
-    def __reduce__(self) -> Any:
-        return type(self), self._given
-
-    def __len__(self) -> int:
-        return len(self._given[1])
-
-    def __getitem__(self, index: Any) -> Any:
-        return self._made(range(len(self))[index])
-
-
 def as_steps(vdis: Any, what: str) -> Any:
     """Return several VDIs that have colours, or keep values of one range, as such.
 
@@ -181,7 +166,7 @@ def as_steps(vdis: Any, what: str) -> Any:
     """
     if isinstance(vdis, str | bytes | os.PathLike) or not np.iterable(vdis):
         raise InvalidVDIError(f"{what} is made of several VDIs: pass them in a list")
-    if isinstance(vdis, Sequence) and not isinstance(vdis, list | tuple | str | bytes):
+    if isinstance(vdis, Sequence) and not isinstance(vdis, list | tuple):
         return vdis
     steps = tuple(v if isinstance(v, DeferredVDI) else as_vdi(v) for v in vdis)
     for i, step in enumerate(steps):

@@ -41,23 +41,57 @@ class SeveralInput(Input):
     Those that are ready are kept as long as they fit in :attr:`memory`.
     """
 
+    collection: Any
     #: VDIs that are read before they are shown.
     ahead = 3
+    #: Returns which are to be read ahead, the first one first.
+    _coming: Callable[[], list[int]]
+    #: Drops what memory is not enough for.
+    _trim: Callable[[], None]
+    #: Indices and weights of what is shown, the nearest first.
+    _weights: list[tuple[int, float]]
 
     def __init__(self, vdis: Any, thread: str) -> None:
         super().__init__()
         self.collection = vdis
+        self.device: Any = None
         self.memory: float = MEMORY
         self._lock = threading.Lock()
         self._ready: dict[int, VDI] = {}  # by index
         self._broken: set[int] = set()
         self._unsaid: list[Exception] = []  # why they are
         self._worker = BackgroundThread(thread)
+        self._kept: dict[int, DeferredInput] = {}  # of what is shown, where it keeps values
+
+    def vdi(self) -> VDI:
+        """Return the VDI that is shown, read now if it is not ready."""
+        self.last = self._seen(self._weights[0][0])
+        return self.last
+
+    @property
+    def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
+        """The values of the VDI that is shown, where it keeps them."""
+        shown: Any = self._at(self._weights[0][0])
+        return shown if isinstance(shown, DeferredVDI) else None
+
+    def bounds(self) -> tuple[float, ...] | None:
+        """Return the bounds of the VDI that was shown last, or of the first."""
+        return self.collection.bounds if self.last is None else self.last.bounds
+
+    def stamp(self) -> Any:
+        """Return which VDI is shown, and the time stamp of what classifies it."""
+        return self._weights[0][0], self.prop and (id(self.prop), self.prop.GetMTime())
 
     def on_devices(self) -> list[Any]:
-        """Return the VDIs that are ready, and what was classified of that which is shown."""
+        """Return the VDIs that are ready, and what was classified of those that are shown."""
         with self._lock:
-            return [self._vdi, *self._ready.values()]
+            ready = [*self._ready.values()]
+        return [self.last, *ready, *(one.last for one in self._kept.values())]
+
+    def look(self, camera: Camera, device: Any) -> None:
+        """Read, for a device, what a view needs, or what comes next."""
+        self.device = device
+        self._read_ahead()
 
     def rest(self) -> None:
         """Leave no thread; the next frame may begin anew."""
@@ -66,19 +100,29 @@ class SeveralInput(Input):
         with self._lock:
             self._ready.clear()
 
+    def _seen(self, i: int) -> VDI:
+        """Return a VDI, with the colours that the property gives it where it keeps values."""
+        vdi: Any = self._at(i)
+        if not isinstance(vdi, DeferredVDI) or self.prop is None:
+            return as_vdi(vdi)  # refuses what has no colours
+        kept = self._kept.get(i)
+        if kept is None or (kept.deferred, kept.prop) != (vdi, self.prop):
+            shown = dict(self._weights)
+            self._kept = {k: one for k, one in self._kept.items() if k in shown}
+            kept = self._kept[i] = DeferredInput(vdi, self.prop)
+        return as_vdi(kept.vdi())
+
     def _wanted(self) -> int | None:
         """Return the next VDI to be read; None where enough are."""
-        raise NotImplementedError
-
-    def _trim(self) -> None:
-        """Drop what memory is not enough for."""
-        raise NotImplementedError
+        with self._lock:
+            known = self._ready.keys() | self._broken
+            return next((i for i in self._coming() if i not in known), None)
 
     def _at(self, i: int) -> Any:
         """Return a VDI, read now if it is not ready."""
         with self._lock:
             known = self._ready.get(i)
-        return self._keep(i, self.collection[i]) if known is None else known  # type: ignore[index]
+        return self._keep(i, self.collection[i]) if known is None else known
 
     def _keep(self, i: int, vdi: VDI) -> VDI:
         with self._lock:
@@ -86,10 +130,10 @@ class SeveralInput(Input):
             self._trim()
         return vdi
 
-    def _read_ahead(self, device: Any) -> None:
+    def _read_ahead(self) -> None:
         """Have read what is wanted, VDI after VDI, until enough are ready."""
         if not self._worker.running and self._wanted() is not None:
-            self._worker.put(Decoding(lambda on, _report: self._decode(on), device))
+            self._worker.put(Decoding(lambda on, _report: self._decode(on), self.device))
 
     def _decode(self, runtime: Runtime) -> bool:
         for _ in range(self.ahead):  # then a frame must have come: nobody may be looking
@@ -107,7 +151,7 @@ class SeveralInput(Input):
 
     def _read(self, i: int, runtime: Runtime) -> VDI:
         """Read a VDI, and bring its lists, with colours or values, to the device."""
-        vdi: Any = self.collection[i]  # type: ignore[index]
+        vdi: Any = self.collection[i]
         (kept_values if isinstance(vdi, DeferredVDI) else prepared_vdi)(runtime, vdi)
         return vdi  # type: ignore[no-any-return]
 
@@ -122,18 +166,17 @@ class SeriesInput(SeveralInput):
     """
 
     collection: VDISeries
+    _place: int
 
     def __init__(self, series: VDISeries, clock: Callable[[], float] = time.perf_counter) -> None:
         super().__init__(series, "pyvista-vdi series")
-        self.device: Any = None
         #: Steps per second, and whether one is shown after the other.
         self.rate, self.playing = RATE, False
         self._clock, self._loop = clock, True
         # Places go on where the series begins anew: place p is step p modulo the steps
-        self._place = self._from = 0
         self._since: float | None = None  # when the place before was due; None before a frame
         self._seconds = 0.0  # that the last step took to be ready
-        self._kept: DeferredInput | None = None  # of the step, where it keeps values
+        self._begin(0)
 
     @property
     def player(self) -> SeriesInput:  # type: ignore[override]
@@ -143,7 +186,7 @@ class SeriesInput(SeveralInput):
     @property
     def step(self) -> int:
         """Index of the step that is shown; negative ones that are set are from the end."""
-        return self._place % len(self.collection)
+        return self._weights[0][0]
 
     @step.setter
     def step(self, step: int) -> None:
@@ -162,34 +205,6 @@ class SeriesInput(SeveralInput):
     @time.setter
     def time(self, time: float) -> None:
         self.step = self.collection.nearest(time)
-
-    def vdi(self) -> VDI:
-        """Return the step's VDI; of values what the property makes of them."""
-        step: Any = self._at(self.step)
-        if isinstance(step, DeferredVDI) and self.prop is not None:
-            if self._kept is None or (self._kept.deferred, self._kept.prop) != (step, self.prop):
-                self._kept = DeferredInput(step, self.prop)
-            step = self._kept.vdi()
-        self._vdi = as_vdi(step)  # refuses what has no colours
-        return self._vdi
-
-    @property
-    def deferred(self) -> DeferredVDI | None:  # type: ignore[override]
-        """The step's values, where it keeps them."""
-        step: Any = self._at(self.step)
-        return step if isinstance(step, DeferredVDI) else None
-
-    def bounds(self) -> tuple[float, ...] | None:
-        """Return the bounds of the step that was shown last, or of the first."""
-        return self.collection.bounds if self._vdi is None else self._vdi.bounds
-
-    def stamp(self) -> Any:
-        """Return the step, and the time stamp of what classifies it."""
-        return self.step, self.prop and (id(self.prop), self.prop.GetMTime())
-
-    def look(self, camera: Camera, device: Any) -> None:
-        """Read for a device."""
-        self.device = device
 
     def play(
         self, rate: float = RATE, *, loop: bool = True, memory_limit: int | None = None
@@ -226,13 +241,14 @@ class SeriesInput(SeveralInput):
             places = range(due, max(self._place, due - n), -1)
             before, ready = self._place, self._ready
             self._place = next((place for place in places if place % n in ready), before)
+            self._weights = [(self._place % n, 1.0)]
             self._trim()
             left = any(step not in self._broken for step in range(self._place + 1, n))
             error = self._unsaid.pop() if self._unsaid else None
         if not self._loop and due >= n - 1 and not left:
             self.pause()
         else:
-            self._read_ahead(self.device)
+            self._read_ahead()
         if error is not None:
             raise error
         return self._place != before
@@ -246,6 +262,7 @@ class SeriesInput(SeveralInput):
         """Show a step; time goes on from it."""
         with self._lock:
             self._place = self._from = step
+            self._weights = [(step, 1.0)]
             self._since = None
             self._trim()
 
@@ -268,16 +285,14 @@ class SeriesInput(SeveralInput):
         while len(last) > self.ahead + 1 and taken > self.memory:
             taken -= self._ready.pop(last.pop()).nbytes * (1 + ON_DEVICE)
 
-    def _wanted(self) -> int | None:
-        n = len(self.collection)
+    def _coming(self) -> list[int]:
+        """Return the steps that will be due when they are ready; none where it does not play."""
         if not self.playing:
-            return None
-        with self._lock:
-            # Where steps take longer than they are shown, those of the moment when they are ready
-            first = max(self._place + 1, self._due_at(self._clock() + self._seconds))
-            last = first + self.ahead if self._loop else min(first + self.ahead, n)
-            known = self._ready.keys() | self._broken
-            return next((place % n for place in range(first, last) if place % n not in known), None)
+            return []
+        n = len(self.collection)
+        first = max(self._place + 1, self._due_at(self._clock() + self._seconds))
+        last = first + self.ahead if self._loop else min(first + self.ahead, n)
+        return [place % n for place in range(first, last)]
 
     def _read(self, i: int, runtime: Runtime) -> VDI:
         began = self._clock()

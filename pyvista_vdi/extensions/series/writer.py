@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from pyvista_vdi.errors import InvalidArgumentError, VDIFileError, naming, warn_external
-from pyvista_vdi.extensions.series.archive import SERIES, Archive, head_bytes, name_of
+from pyvista_vdi.extensions.series.archive import SERIES, VDI_NAME, Archive, head_bytes
 from pyvista_vdi.extensions.series.generate import StepMaker
 from pyvista_vdi.extensions.series.series import check_range, checked_time, times_of
 from pyvista_vdi.io import check_write_options
@@ -96,7 +96,7 @@ class SeriesWriter(contextlib.AbstractContextManager["SeriesWriter"]):
             given = {"precision": precision, "device": device, **options}
             self._make = StepMaker("SeriesWriter", camera, window_size, **given)
         self._how = {"precision": precision, "compression": compression, "level": level}
-        check_write_options(name_of(0), self._how)
+        check_write_options(VDI_NAME.format(0), self._how)
         self.path = Path(os.path.realpath(with_suffix(as_path(path), (SERIES.suffix,), "a series")))
         self._times: list[float] = []
         self._range: tuple[float, float] | None = None  # of the values that steps keep
@@ -147,7 +147,16 @@ class SeriesWriter(contextlib.AbstractContextManager["SeriesWriter"]):
         VDIFileError
             If the writer is closed or the step cannot be written; the steps before stay.
         """
-        time = self.checked_time(time)
+        if self._lock is None:
+            raise VDIFileError(
+                f"{self.path} is closed: no step can be appended; make another SeriesWriter with "
+                "append=True to continue"
+            )
+        time = float(len(self)) if time is None else checked_time(time)
+        if self._times and not time > self._times[-1]:
+            raise InvalidArgumentError(
+                f"times must ascend; got {time} after {self._times[-1]}, that of the last step"
+            )
         if not isinstance(step, VDI | DeferredVDI):
             if self._make is None:
                 raise InvalidArgumentError(
@@ -167,24 +176,10 @@ class SeriesWriter(contextlib.AbstractContextManager["SeriesWriter"]):
             self._range = getattr(step, "value_range", None)
         check_range(step, self._range, f"number {len(self)}")
         # The step first: one whose time is not known is none, and is replaced by the next
-        step.save(self.path / name_of(len(self)), **self._how)
+        step.save(self.path / VDI_NAME.format(len(self)), **self._how)
         self._write_times([*self._times, time])
         self._before = None
         return step  # type: ignore[no-any-return]
-
-    def checked_time(self, time: float | None) -> float:
-        """Return the next step's time, or raise what :meth:`append` would raise for it."""
-        if self._lock is None:
-            raise VDIFileError(
-                f"{self.path} is closed: no step can be appended; make another SeriesWriter with "
-                "append=True to continue"
-            )
-        value = float(len(self)) if time is None else checked_time(time)
-        if self._times and not value > self._times[-1]:
-            raise InvalidArgumentError(
-                f"times must ascend; got {value} after {self._times[-1]}, that of the last step"
-            )
-        return value
 
     def _write_times(self, times: list[float]) -> None:
         with whole_file(self.path / SERIES.head) as stream:

@@ -10,9 +10,6 @@ EXTENSION = Extension(
         "generate_set": "pyvista_vdi.extensions.sets.generate:generate_set",
     },
     formats=(FileFormat(".vdiset", "pyvista_vdi.extensions.sets.vdi_set", "set", head="set.json"),),
-    shown={
-        "pyvista_vdi.extensions.sets.vdi_set:VDISet": "pyvista_vdi.extensions.sets.shown:SetInput"
-    },
     verbs=(
         Verb(
             "set",

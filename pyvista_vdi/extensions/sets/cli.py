@@ -6,12 +6,9 @@ import argparse
 from contextlib import closing
 from pathlib import Path
 
-from pyvista_vdi.cli.generate import generating_view
+from pyvista_vdi.cli.generate import generating_view, say_vdi
 from pyvista_vdi.cli.inputs import classification, given, read_volume
-from pyvista_vdi.cli.text import printable
 from pyvista_vdi.extensions.sets.generate import generate_set
-from pyvista_vdi.model.arguments import records_of
-from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 from pyvista_vdi.plotting.progress import DelayedBar
@@ -21,7 +18,6 @@ def generate(options: argparse.Namespace) -> int:
     """Generate a set of VDIs and write it."""
     target = check_writable(with_suffix(Path(options.output), (".vdiset",), "a set"))
     look, how = classification(options), given(options, GenerationOptions)
-    records_of(look, "set", Classification)  # refused before the volume is read
     volume = read_volume(options)
     asked = {n: getattr(options, n) for n in ("views", "half_angle", "lists", "device")}
     how |= {name: value for name, value in asked.items() if value is not None}
@@ -29,8 +25,7 @@ def generate(options: argparse.Namespace) -> int:
     with closing(DelayedBar(label="generating a set")) as bar:
         vdi_set = generate_set(volume, progress=bar, **how)
         vdi_set.save(target, progress=bar)
-    n_bytes = f"{target.stat().st_size / 2**20:.1f} MiB"
-    print(f"{printable(options.output)}: {len(vdi_set)} VDIs, {n_bytes}")
+    say_vdi(options, f"{len(vdi_set)} VDIs")
     return 0
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, overload
 
 import numpy as np
@@ -17,13 +17,12 @@ from pyvista_vdi.errors import (
     VDIError,
 )
 from pyvista_vdi.extensions.series.archive import Archive
-from pyvista_vdi.extensions.series.series import Called, as_steps
+from pyvista_vdi.extensions.series.series import Several, as_steps
 from pyvista_vdi.extensions.sets import EXTENSION
 from pyvista_vdi.io.progress import Pieces, Progress
 from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.camera import Camera, check_window_size
 from pyvista_vdi.model.checks import as_float, as_vector
-from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.view_error import eye_from_centre
 
@@ -35,7 +34,7 @@ _LENS = math.tan(math.radians(15))
 MOST_BLENDED = 3
 
 
-class VDISet(VDICollection):
+class VDISet(Several):
     """The VDIs of one scene from many views V_O: a sequence of :class:`VDI`.
 
     Made by :func:`pyvista_vdi.generate_set`, by :func:`pyvista_vdi.read` from a ``.vdiset`` file,
@@ -69,8 +68,12 @@ class VDISet(VDICollection):
 
     Attributes
     ----------
-    window_size : (int, int)
-        As above.
+    cameras : tuple of Camera
+        The generating view V_O of each VDI.
+    camera : Camera
+        The view to begin with, for pictures of ``window_size``.
+    window_size, picture_size : (int, int)
+        As above; the second is its name for a VDI.
     bounds : tuple of float
         As above.
     blend : float
@@ -79,7 +82,7 @@ class VDISet(VDICollection):
         the nearest. 0 shows the nearest alone.
     """
 
-    kind = EXTENSION.formats[0]
+    kind, drawn_by = EXTENSION.formats[0], "pyvista_vdi.extensions.sets.shown:SetInput"
 
     def __init__(
         self,
@@ -90,20 +93,19 @@ class VDISet(VDICollection):
         bounds: Sequence[float] | None = None,
         camera: Any = None,
     ) -> None:
-        self._views = as_steps(views, "a set")
+        self._vdis = as_steps(views, "a set")
         if cameras is None:
-            cameras = [vdi.camera for vdi in as_steps(list(self._views), "a set")]
+            cameras = [vdi.camera for vdi in as_steps(list(self._vdis), "a set")]
         elif not np.iterable(cameras):
             raise InvalidArgumentTypeError(f"cameras must be one for each VDI; got {cameras!r}")
-        self._cameras = tuple(Camera.from_any(camera) for camera in cameras)
-        if not len(self._views) == len(self._cameras) > 0:
+        self.cameras = tuple(Camera.from_any(camera) for camera in cameras)
+        if not len(self) == len(self.cameras) > 0:
             raise InvalidArgumentError(
-                f"a set has a camera for each VDI, and at least one; got {len(self._views)} VDIs "
-                f"and {len(self._cameras)} cameras"
+                f"a set has a camera for each VDI, and at least one; got {len(self)} VDIs "
+                f"and {len(self.cameras)} cameras"
             )
-        self.window_size = check_window_size(
-            self[0].picture_size if window_size is None else window_size
-        )
+        size = self[0].picture_size if window_size is None else window_size
+        self.window_size = self.picture_size = check_window_size(size)
         given = self[0].bounds if bounds is None else bounds
         self.bounds: tuple[float, ...] = as_vector(given, "bounds", 6)
         for i, vdi in enumerate(self if bounds is None else ()):
@@ -112,8 +114,8 @@ class VDISet(VDICollection):
                     f"the VDIs of a set are of one scene: number {i} has the bounds "
                     f"{vdi.bounds}, the first {self.bounds}"
                 )
-        self._begin = self._cameras[0] if camera is None else Camera.from_any(camera)
-        self._places = self._places_of(self._cameras)
+        self.camera = self.cameras[0] if camera is None else Camera.from_any(camera)
+        self._places = self._places_of(self.cameras)
         self.blend = BLEND
 
     @property
@@ -126,24 +128,6 @@ class VDISet(VDICollection):
             "bounds": list(self.bounds),
         }
 
-    @property
-    def camera(self) -> Camera:
-        """The view to begin with, for pictures of :attr:`window_size`."""
-        return self._begin
-
-    @property
-    def picture_size(self) -> tuple[int, int]:
-        """:attr:`window_size`, by the name that it has for a VDI."""
-        return self.window_size
-
-    @property
-    def cameras(self) -> tuple[Camera, ...]:
-        """The generating view V_O of each VDI."""
-        return self._cameras
-
-    def __len__(self) -> int:
-        return len(self._cameras)
-
     @overload
     def __getitem__(self, index: int) -> VDI: ...
     @overload
@@ -151,18 +135,7 @@ class VDISet(VDICollection):
     def __getitem__(self, index: int | slice) -> VDI | list[VDI]:
         if isinstance(index, slice):
             return [self[i] for i in range(len(self))[index]]
-        return self._views[self._place(index, "VDIs")]  # type: ignore[no-any-return]
-
-    def _mapped(self, function: Callable[[VDI], VDI]) -> VDISet:
-        found = VDISet(
-            Called(function, self, kept=8),
-            self.cameras,
-            window_size=self.window_size,
-            bounds=self.bounds,
-            camera=self.camera,
-        )
-        found.blend = self.blend
-        return found
+        return self._vdis[self._place(index, "VDIs")]  # type: ignore[no-any-return]
 
     def distances(self, camera: Any) -> NDArray[np.float64]:
         """Return how far each V_O's eye is from that of a view, degrees, float64 (n,).
@@ -232,7 +205,7 @@ class VDISet(VDICollection):
 
         float64 (n, 4). Directions are those of the model as the first V_O's transform shows it.
         """
-        shown = self._cameras[0].model_transform[:3, :3]
+        shown = self.cameras[0].model_transform[:3, :3]
         towards, lengths = zip(
             *(eye_from_centre(view, self.bounds, shown) for view in cameras), strict=True
         )

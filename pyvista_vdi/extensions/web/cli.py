@@ -9,7 +9,7 @@ from typing import Any
 from pyvista_vdi.cli.inputs import classification, given, read_volume
 from pyvista_vdi.cli.steps import Step, in_order, steps_of_volumes
 from pyvista_vdi.errors import naming
-from pyvista_vdi.extensions.series.series import Called
+from pyvista_vdi.extensions.series.archive import Called
 from pyvista_vdi.model.options import GenerationOptions
 
 

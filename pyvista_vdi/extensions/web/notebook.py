@@ -6,7 +6,7 @@ from collections.abc import Collection
 from typing import Any
 
 from pyvista_vdi.errors import MissingDependencyError, warn_external
-from pyvista_vdi.extensions.web.shown import Shown, in_a_terminal, seen_of, still
+from pyvista_vdi.extensions.web.shown import Shown, seen_of, shell, still
 from pyvista_vdi.model.collection import VDICollection
 
 
@@ -19,8 +19,9 @@ def mime_bundle(
 
     Or what there can be of it.
     """
+    in_a_terminal = shell() is not None and not hasattr(shell(), "kernel")
     of_values = isinstance(vdi, VDICollection) and vdi.value_range is not None
-    if in_a_terminal() or of_values:  # pages of several show colours
+    if in_a_terminal or of_values:  # pages of several show colours
         return {}
     try:
         from pyvista_vdi.extensions.web.widget import VDIWidget

@@ -20,11 +20,12 @@ from pyvista_vdi.errors import InvalidArgumentError, VDIFileError
 from pyvista_vdi.extensions.sets.vdi_set import VDISet
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.shown import Shown, as_shown, file_of, seen_of
+from pyvista_vdi.io.png import to_bytes
 from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file import reader
 from pyvista_vdi.io.vdi_file.layout import DEFLATE
 from pyvista_vdi.io.vdi_file.reader import FileInfo
-from pyvista_vdi.model.metrics import check_background, over_background
+from pyvista_vdi.model.metrics import check_background
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.whole_file import check_writable, whole_file
 
@@ -89,37 +90,6 @@ _NO_SCRIPT = (
 )
 
 
-def page(
-    shown: Shown,
-    *,
-    title: str = "VDI",
-    background: Sequence[float] = (0.0, 0.0, 0.0),
-    precision: str | None = None,
-    level: int | None = None,
-    autoplay: bool = False,
-    progress: Progress | None = None,
-    **look: Any,
-) -> bytes:
-    """Return an HTML page that shows a VDI, as large as the window, behind it an RGB from 0 to 1.
-
-    Or one that plays a series, with ``autoplay`` as soon as it is opened, or shows a set.
-    ``precision`` is "8-byte" by default, and ``level`` (of deflate) 6. A page of a
-    :class:`DeferredVDI` holds its values, and its transfer function is edited there; ``look``: what
-    that begins with, the arguments of :meth:`DeferredVDI.classified`.
-    """
-    shown = as_shown(shown)
-    seen = seen_of(shown, **look)
-    percents = " ".join(f"{100 * channel:g}%" for channel in check_background(background))
-    still = np.rint(over_background(_from_generating_view(seen), background) * 255)
-    # That of the view that it was made for
-    size = seen.window_size if "screen" in seen.metadata else seen.picture_size
-    size = shown.window_size if isinstance(shown, VDISet) else size
-    color = f"rgb({percents})"
-    file = file_of(shown, precision or "8-byte", level, seen=seen, progress=progress)
-    how = {"title": title, "background": color, "autoplay": autoplay}
-    return page_of(file, still.astype(np.uint8), size, **how).encode()  # type: ignore[arg-type]
-
-
 def page_of(
     file: tuple[bytes, int] | None,
     still: NDArray[np.uint8],
@@ -170,19 +140,41 @@ def write(
     *,
     compression: str = DEFLATE,
     title: str | None = None,
-    **options: Any,
+    background: Sequence[float] = (0.0, 0.0, 0.0),
+    precision: str | None = None,
+    level: int | None = None,
+    autoplay: bool = False,
+    progress: Progress | None = None,
+    **look: Any,
 ) -> Path:
-    """Write a page with a VDI, a series or a set: see :func:`pyvista_vdi.io.write`, :func:`page`.
+    """Write a page that shows a VDI, as large as the window, behind it an RGB from 0 to 1.
 
-    ``compression`` is deflate, the one that browsers decode; the title is the file's name by
-    default.
+    Or one that plays a series, with ``autoplay`` as soon as it is opened, or shows a set: see
+    :func:`pyvista_vdi.io.write`. ``compression`` is deflate, the one that browsers decode; by
+    default ``level`` is 6, ``precision`` "8-byte", and ``title`` the file's name. A page of a
+    :class:`DeferredVDI` holds its values, and its transfer function is edited there; ``look``: what
+    that begins with, the arguments of :meth:`DeferredVDI.classified`.
     """
     if compression != DEFLATE:
         raise InvalidArgumentError(f"pages are compressed by deflate; got {compression!r}")
     target = check_writable(path)
-    content = page(shown, title=target.stem if title is None else title, **options)
+    shown = as_shown(shown)
+    seen = seen_of(shown, **look)
+    still = to_bytes(_from_generating_view(seen), background)
+    # That of the view that it was made for
+    size = seen.window_size if "screen" in seen.metadata else seen.picture_size
+    size = shown.window_size if isinstance(shown, VDISet) else size
+    percents = " ".join(f"{100 * channel:g}%" for channel in check_background(background))
+    content = page_of(
+        file_of(shown, precision, level, seen=seen, progress=progress),
+        still,
+        size,
+        title=target.stem if title is None else title,
+        background=f"rgb({percents})",
+        autoplay=autoplay,
+    )
     with whole_file(target) as stream:
-        stream.write(content)
+        stream.write(content.encode())
     return target
 
 

@@ -81,7 +81,7 @@ def seen_of(shown: Shown, *, camera: Any = None, time: float | None = None, **lo
 
 def file_of(
     shown: Shown,
-    precision: str = "8-byte",
+    precision: str | None = None,
     level: int | None = None,
     *,
     seen: VDI | None = None,
@@ -89,9 +89,10 @@ def file_of(
 ) -> tuple[bytes, int]:
     """Return the file of what is shown, and how many bytes of it give a first picture.
 
-    ``seen``: of values those with the colours that editing begins with.
+    ``precision`` is "8-byte" by default. ``seen``: of values those with the colours that editing
+    begins with.
     """
-    stream = io.BytesIO()
+    stream, precision = io.BytesIO(), precision or "8-byte"
     if isinstance(shown, VDISeries | VDISet):
         options: Any = {"precision": precision, "compression": DEFLATE, "level": level}
         first = write_several(stream, shown, progress=progress, **options)
@@ -113,7 +114,7 @@ def bare_file(vdi: VDI) -> bytes:
 
     A table of 4096 colours would be longer than a small VDI.
     """
-    bare = copy.copy(vdi.with_precision("8-byte"))
+    bare = copy.copy(vdi)
     bare.metadata = {}
     return file_of(bare, level=EFFORT)[0]
 
@@ -151,12 +152,8 @@ def png(pixels: NDArray[np.uint8]) -> str:
     return b64encode(stream.getvalue()).decode()
 
 
-def in_a_terminal() -> bool:
-    """Whether IPython shows text alone; other notebooks may have no IPython."""
-    return _shell() is not None and not hasattr(_shell(), "kernel")
-
-
-def _shell() -> Any:
+def shell() -> Any:
+    """Return IPython's shell, which has a ``kernel`` if it shows more than text, or None."""
     return getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
 
 
@@ -169,11 +166,11 @@ def with_still(data: Any, picture: str | None, key: str) -> Any:
     """
     if picture is None:
         return data
-    if not hasattr(_shell(), "kernel"):
+    if not hasattr(shell(), "kernel"):
         return {**data, "image/png": picture}
     image = f'<img data-vdi="{key}" style="max-width: 100%" alt="a still picture of a volume" '
     html = f'{image}src="data:image/png;base64,{picture}">'
-    _shell().display_pub.publish({"text/html": html, "text/plain": "a still picture of a volume"})
+    shell().display_pub.publish({"text/html": html, "text/plain": "a still picture of a volume"})
     return data
 
 

@@ -206,10 +206,8 @@ class VDIWidget(anywidget.AnyWidget):
         shown = of_viewers.as_shown(vdi)
         self._file = self._sent(shown)
         self._vdi = shown
-        time = None
-        if isinstance(shown, VDISeries):
-            time = shown.times[shown.nearest(self.time or 0.0)]
-        self.time = time
+        steps = shown if isinstance(shown, VDISeries) else None
+        self.time = None if steps is None else steps.times[steps.nearest(self.time or 0.0)]
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.vdi!r})"
@@ -217,7 +215,7 @@ class VDIWidget(anywidget.AnyWidget):
     def _sent(self, shown: Any) -> bytes:
         """Return the file that the browser is sent."""
         seen = of_viewers.seen_of(shown, **self._first_look)
-        precision = "exact" if seen.counts.max() > DEPTH_CODES else "8-byte"
+        precision = "exact" if seen.counts.max() > DEPTH_CODES else None
         # A cell waits for it: a twentieth more bytes than by level 6, in half the time
         return of_viewers.file_of(shown, precision, 1, seen=seen)[0]
 

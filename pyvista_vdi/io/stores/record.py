@@ -10,7 +10,7 @@ import numpy as np
 
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.chunked import ChunkedArray, closed, opened
+from pyvista_vdi.model.chunked import ChunkedArray, Reopened
 from pyvista_vdi.model.view import required_level
 from pyvista_vdi.model.volume import Grid, Volume
 
@@ -19,7 +19,7 @@ AXES = ("t", "c", "z", "y", "x")
 
 
 @dataclass(frozen=True)
-class Level:
+class Level(Reopened):
     """One array of a store, and where its points are.
 
     Attributes
@@ -35,12 +35,6 @@ class Level:
     path: str
     array: Any
     grid: Grid
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "array": closed(self.array)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state, array=opened(state["array"]))
 
 
 @dataclass(frozen=True)

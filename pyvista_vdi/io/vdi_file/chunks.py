@@ -36,7 +36,8 @@ _DEFLATE_RATIO = 1032
 #: and of the chunk with its header (c-blosc, README_CHUNK_FORMAT.rst).
 _HEADER = struct.Struct("<BBBBIII")
 
-_MAX_THREADS = 8
+#: Threads for work on chunks; in them Blosc starts none of its own.
+THREADS = min(8, cpu_count() or 1)
 
 
 class DamagedChunkError(Exception):
@@ -75,9 +76,9 @@ def write_chunks(
 
     # Always in worker threads: there numcodecs lets each call compress with one thread, so that
     # the bytes do not depend on which of Blosc's own threads finishes first.
-    with workers() as pool:
+    with ThreadPoolExecutor(THREADS) as pool:
         index: list[tuple[int, int]] = []
-        ranges, ahead = layout.ranges(), 4 * _MAX_THREADS
+        ranges, ahead = layout.ranges(), 4 * THREADS
         for start in range(0, len(ranges), ahead):
             for chunk, checksum in pool.map(compressed, ranges[start : start + ahead]):
                 stream.write(chunk)
@@ -176,8 +177,3 @@ def check_level(level: Any) -> None:
     """Raise InvalidArgumentError unless a compressor's effort is None or 1 to 9."""
     if level is not None and (type(level) is not int or not 1 <= level <= 9):
         raise InvalidArgumentError(f"level must be a whole number from 1 to 9; got {level!r}")
-
-
-def workers() -> ThreadPoolExecutor:
-    """Return threads for work on chunks; in them Blosc starts none of its own."""
-    return ThreadPoolExecutor(min(_MAX_THREADS, cpu_count() or 1))

@@ -8,6 +8,8 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +22,7 @@ from numpy.typing import NDArray
 from pyvista_vdi._version import __version__
 from pyvista_vdi.errors import InvalidVDIError, VDIError, VDIFileError
 from pyvista_vdi.io.progress import Pieces, Progress
-from pyvista_vdi.io.vdi_file.chunks import CODECS, DamagedChunkError, PackedArray, workers
+from pyvista_vdi.io.vdi_file.chunks import CODECS, THREADS, DamagedChunkError, PackedArray
 from pyvista_vdi.io.vdi_file.layout import (
     CHUNK_ROWS,
     DEFERRED_NAME,
@@ -129,17 +131,21 @@ def read_info(path: str | os.PathLike[str], *, stream: BinaryIO | None = None) -
         return file.info
 
 
-class _OpenFile:
+def opened_file(path: str | os.PathLike[str]) -> BinaryIO:
+    """Open a file to be read; VDIFileError says why it cannot be."""
+    try:
+        return Path(path).open("rb")
+    except (OSError, ValueError, TypeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise VDIFileError(f"{path!s} cannot be read: {reason}") from error
+
+
+class _OpenFile(AbstractContextManager["_OpenFile"]):
     """A .vdi file whose description has been read and checked."""
 
     def __init__(self, path: str | os.PathLike[str], stream: BinaryIO | None = None) -> None:
-        try:
-            self._path = Path(path)
-            self._stream = self._path.open("rb") if stream is None else stream
-        except (OSError, ValueError, TypeError) as error:
-            raise VDIFileError(
-                f"{path!s} cannot be read: {getattr(error, 'strerror', None) or error}"
-            ) from error
+        self._stream = opened_file(path) if stream is None else stream
+        self._path = Path(path)
         try:
             self._archive = self._opened_archive()
             self._description = self._read_description()
@@ -151,9 +157,6 @@ class _OpenFile:
         except BaseException:
             self._stream.close()
             raise
-
-    def __enter__(self) -> _OpenFile:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._archive.close()
@@ -334,7 +337,7 @@ class _OpenFile:
             names = [faces, *((name,) for name in stored if name not in faces)]
         tasks = [(each, *rows) for each in names for rows in self._layouts[each[0]].ranges()]
         done = Pieces(progress, len(tasks))
-        with workers() as pool:
+        with ThreadPoolExecutor(THREADS) as pool:
             for _ in pool.map(lambda task: decode(*task), tasks):  # raises what went wrong
                 done()
         return stored

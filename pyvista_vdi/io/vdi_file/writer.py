@@ -66,7 +66,7 @@ def write(
 
 def write_to(
     stream: IO[bytes],
-    shown: VDI | DeferredVDI,
+    vdi: VDI | DeferredVDI,
     compression: str,
     level: int | None = None,
     progress: Progress | None = None,
@@ -75,11 +75,11 @@ def write_to(
 ) -> None:
     """Write a .vdi file to a stream that can be sought in.
 
-    ``stream``: takes the bytes. ``shown``, ``compression``, ``level``, ``progress``: as for
+    ``stream``: takes the bytes. ``vdi``, ``compression``, ``level``, ``progress``: as for
     :func:`write`; the VDI has the precision to write. ``coarse``: whether a file of version 4
     begins with a coarse level; lists that keep values have none, as these do not mix as media do.
     """
-    vdi, about = shown.lists, getattr(shown, "about", None)
+    about = getattr(vdi, "about", None)
     longest = int(vdi.counts.max())
     kind = next(kind for kind in ("<u1", "<u2", "<u4", "<u8") if longest <= np.iinfo(kind).max)
     counts = vdi.counts.ravel().astype(kind)
@@ -88,7 +88,7 @@ def write_to(
     filtered = compression != "none"
     arrays = layouts(vdi, counts.dtype, filtered=filtered, version=version)
     # Describe them
-    entries = describe(shown, version)
+    entries = describe(vdi, version)
     if about is not None:
         entries |= {"format": DEFERRED_NAME, "deferred": about}
     metadata = entries.pop("metadata")
@@ -104,7 +104,7 @@ def write_to(
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(stored(DESCRIPTION), description)
         shrinks = min(vdi.window_size) >= COARSE_STEP and longest <= DEPTH_CODES
-        if coarse and compression == DEFLATE and shrinks and about is None:
+        if coarse and compression == DEFLATE and shrinks and isinstance(vdi, VDI):
             small = coarser(vdi, COARSE_STEP).with_precision("8-byte")
             few = io.BytesIO()
             write_to(few, small, DEFLATE, effort, coarse=False)
@@ -146,10 +146,7 @@ def coarser(vdi: VDI, step: int = 4) -> VDI:
     offsets = np.concatenate([[0], np.cumsum(counts)])
     rows = np.repeat(vdi.offsets.view(np.int64)[taken] - offsets[:-1], counts)
     rows += np.arange(offsets[-1])
-    old = [(2 * p + 1) / n - 1 for p, n in zip((x, y), vdi.window_size, strict=True)]
-    stretch = length_per_depth(camera, window, *new) / length_per_depth(
-        camera, vdi.window_size, *old
-    )
+    stretch = length_per_depth(camera, window) / length_per_depth(camera, vdi.window_size, x, y)
     tau = vdi.optical_depth[rows] * np.repeat(stretch.ravel(), counts)
     arrays = vdi.arrays.take(offsets, rows)._replace(optical_depth=tau.astype(np.float32))
     return made_vdi(arrays, vdi, camera=camera, window_size=window, metadata={})
@@ -186,7 +183,7 @@ def stored_rows(packed: Packed8, name: str, first: int, last: int) -> NDArray[An
 
 
 def _encoder(
-    name: str, layout: Layout, vdi: VDI, counts: NDArray[Any]
+    name: str, layout: Layout, vdi: VDI | DeferredVDI, counts: NDArray[Any]
 ) -> Callable[[int, int], NDArray[Any]]:
     """Return what gives rows of an array as they are stored."""
     packing = vdi.packing
@@ -208,7 +205,7 @@ def _encoder(
             if name == "front":
                 rows = np.append(front[:1], front[1:] - back[:-1])
         else:
-            rows = getattr(vdi, name)[first:last]
+            rows = getattr(vdi.arrays, name)[first:last]
         return np.ascontiguousarray(rows, dtype=layout.dtype)
 
     return encoded

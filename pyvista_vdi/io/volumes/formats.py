@@ -170,7 +170,7 @@ def _described(opened: Any, number: int, page: Any) -> tuple[list[float], str, l
 
 def vtk(file: Path) -> list[VolumeInFile]:
     """Return what PyVista reads: this room knows neither VTK nor PyVista."""
-    return registry.placed("readers", "")(file)  # type: ignore[no-any-return]
+    return registry.method("volumes_in")(file)  # type: ignore[no-any-return]
 
 
 class VolumeFormat(NamedTuple):

@@ -30,14 +30,16 @@ def head_of(file: Path) -> bytes:
     return head
 
 
+@dataclass
 class Lazy:
     """An array of which the shape and the type are known, and which is read where it is indexed."""
 
-    def __init__(self, shape: Sequence[int], dtype: Any, read: Callable[[], NDArray[Any]]) -> None:
-        self.shape, self.dtype, self._read = tuple(shape), np.dtype(dtype), read
+    shape: Sequence[int]
+    dtype: np.dtype[Any]
+    read: Callable[[], NDArray[Any]]
 
     def __getitem__(self, index: Any) -> NDArray[Any]:
-        return self._read()[index]
+        return self.read()[index]
 
 
 @dataclass(frozen=True, eq=False)

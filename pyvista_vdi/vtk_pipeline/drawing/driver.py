@@ -28,8 +28,17 @@ from pyvista_vdi.model.options import FrameRequest, RenderOptions
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.model.view import View, coverage
 from pyvista_vdi.quality.background import BackgroundThread, Job, vdi_job
-from pyvista_vdi.quality.costs import Costs
-from pyvista_vdi.quality.plan import SETTLED, Made, Making, Plan, Seen, ViewEstimate, lacking, plan
+from pyvista_vdi.quality.plan import (
+    SETTLED,
+    Costs,
+    Made,
+    Making,
+    Plan,
+    Seen,
+    ViewEstimate,
+    lacking,
+    plan,
+)
 from pyvista_vdi.quality.rate import FLOOR, reduced
 from pyvista_vdi.quality.view_error import (
     ViewErrorEstimator,
@@ -38,19 +47,18 @@ from pyvista_vdi.quality.view_error import (
 )
 from pyvista_vdi.raycasting.picking import FirstHit, Pick, pick_vdi
 from pyvista_vdi.raycasting.prepared import release_from_devices
-from pyvista_vdi.vtk_pipeline.drawing.box import Box
-from pyvista_vdi.vtk_pipeline.drawing.depth import opaque_depth
 from pyvista_vdi.vtk_pipeline.drawing.frame import (
     Frame,
     Matrix,
     consumers,
+    opaque_depth,
     planes_of,
     tiled,
     viewport,
 )
 from pyvista_vdi.vtk_pipeline.drawing.images import NOTHING, Drawn, VolumePicture, raycast
 from pyvista_vdi.vtk_pipeline.drawing.overlap import group_of
-from pyvista_vdi.vtk_pipeline.drawing.screen import ImageTexture, NoDepth, place_image
+from pyvista_vdi.vtk_pipeline.drawing.screen import Box, Textures, place_image
 from pyvista_vdi.vtk_pipeline.drawing.settings import MapperSettings
 from pyvista_vdi.vtk_pipeline.drawing.window import Timer, VDIStatus, Window, now
 from pyvista_vdi.vtk_pipeline.filters.inputs import Input
@@ -68,7 +76,7 @@ _TRIALS = 5
 
 
 class Driver:
-    """What happens behind a :class:`VDIMapper`; its observers call :meth:`begin` and :meth:`end`.
+    """What happens behind a :class:`VDIMapper`, whose events call :meth:`begin` and :meth:`end`.
 
     It holds its actor and its windows weakly, so that nothing here keeps a scene alive. One thing
     at a time is made in the background of the frames, by one thread, which knows nothing of VTK
@@ -83,7 +91,6 @@ class Driver:
     def __init__(self) -> None:
         self.actor: Callable[[], Any] = lambda: None
         self.settings = MapperSettings()
-        self.device: Any = None
         self.input: Input | None = None
         self.said: set[Hashable] = set()  # warnings, or their causes
         self.failed: tuple[Any, ...] = ()  # stamps at which a VDI could not be made
@@ -96,7 +103,7 @@ class Driver:
         # What the last frame showed, and by what
         self._last, self._spare = NOTHING, NOTHING.pixels
         self._stand_in = False  # whether that was a volume whose VDI is to come
-        self._texture, self._no_depth = ImageTexture(), NoDepth()
+        self._textures = Textures()
         self._counted: Any = None  # the VDI that was shown last, weakly
         self._generation = 0  # how many were
         self._timer = Timer(self._tick)
@@ -157,53 +164,48 @@ class Driver:
         self.forget()
         self.worker.join()
         release_from_devices(held)
-        self._texture.release()
-        self._texture = ImageTexture()  # it holds the image as well
-        self._no_depth.release()
+        self._textures.release()
+        self._textures = Textures()  # they hold the image as well
         self._last, self._spare = replace(self._last, image=NOTHING.image, key=None), None
 
     # A frame
 
-    def begin(self, mapper: Any) -> None:
+    def begin(self, mapper: Any, event: str) -> None:
         """Raycast and upload the image for the frame that has just begun."""
-        actor, renderer = self.actor(), self.renderer()
-        if renderer is None or not _is_drawing(renderer):
+        actor, renderer, frame = self.actor(), self._renderer(), None
+        if renderer is None:
             self.warn(
                 "VDIMapper draws only behind its own VDIActor: use VDIActor in place of vtkVolume"
             )
-            return
-        # VTK asks for four where the actor's property says that they are dependent
-        self.box.give_components(1 if actor.GetProperty().GetIndependentComponents() else 4)
-        frame = self._guarded(Frame.current, renderer, actor, mapper)
-        if frame is None:  # or beside the tile of a picture that is drawn
-            return
-        window, vtk_window = frame.window, renderer.GetRenderWindow()
-        self._window = weakref.ref(window)
-        # A selection draws numbers where the last frame showed something
-        if renderer.GetSelector() is None:
-            with suppress(VDIError):  # which what is drawn says
-                self.box.Update()
-            self._last = self._guarded(self._paint, frame) or self._last
-        drawn = self._last
-        window.pace.frame.preview |= drawn.preview
-        # Pixels are interpolated, but not where the neighbours are another actor's
-        smooth = drawn.preview and not drawn.joint
-        unit = self._texture.show(vtk_window, drawn.image, smooth=smooth)
-        place_image(actor, unit, frame.origin, frame.full_size)
-        self._no_depth.show(vtk_window, mapper)
-        self.follow(window)
+        else:
+            frame = self._guarded(Frame.current, renderer, actor, mapper)
+        if frame is not None:  # and not beside the tile of a picture that is drawn
+            self._window = weakref.ref(frame.window)
+            # A selection draws numbers where the last frame showed something
+            if renderer.GetSelector() is None:
+                with suppress(VDIError):  # which what is drawn says
+                    self.box.Update()
+                self._last = self._guarded(self._paint, frame) or self._last
+            drawn = self._last
+            frame.window.pace.frame.preview |= drawn.preview
+            # Pixels are interpolated, but not where the neighbours are another actor's
+            smooth = drawn.preview and not drawn.joint
+            vtk_window = renderer.GetRenderWindow()
+            unit = self._textures.show(vtk_window, mapper, drawn.image, smooth=smooth)
+            place_image(actor, unit, frame.origin, frame.full_size)
+            self.follow(frame.window)
+        self.box.begin(actor)
 
-    def end(self) -> None:
+    def end(self, mapper: Any, event: str) -> None:
         """Release the texture units, and give the box its bounds again."""
         self.box.end()
-        self._texture.let_go()
-        self._no_depth.let_go()
+        self._textures.let_go()
         if self.seen is not None and self.seen.hand:
             self.worker.pause(SETTLED)  # from now on
 
     def _paint(self, frame: Frame) -> Drawn:
         """Return the frame's image: the last one, or a new one."""
-        shown = self._seen_in(frame)
+        shown = self._showing(frame)
         self._stand_in = shown is not None and shown.stand_in
         if shown is None:
             return self._last
@@ -217,16 +219,17 @@ class Driver:
         share = 1 / self.settings.image_distance**2
         for size in dict.fromkeys((reduced(frame.full_size, share), self.preview_size(frame))):
             sized = frame.coarser(size)
-            if self._last.shows(sized):
+            a, b = self._last.depth, sized.depth  # by their keys both have one, or neither has
+            if self._last.key == sized.key and (a is None or b is None or np.array_equal(a, b)):
                 return self._last
         # Raycast, and note what that took
         began = now()
-        drawn = raycast(sized, self.device, self._spare)
+        drawn = raycast(sized, self.settings.device, self._spare)
         seconds = now() - began
         self._spare = self._last.pixels
         window.pace.drawn(sized.size, sized.full_size, seconds, sized.way, sized.effort)
         # A volume's first picture has kernels compiled and voxels sent to the device
-        gpu = not get_runtime(self.device).is_cpu
+        gpu = not get_runtime(self.settings.device).is_cpu
         if sized.volume is None or sized.volume.pictures > 1:
             of = (sized.way, sized.angle, sized.covered_by(sized.bounds), seconds)
             self.costs = self.costs.took(*of, gpu=gpu)
@@ -234,28 +237,18 @@ class Driver:
             coarse, taken = frame.coarser(reduced(frame.full_size, FLOOR)), []
             for _ in range(_TRIALS):
                 began = now()
-                raycast(coarse, self.device, None)
+                raycast(coarse, self.settings.device, None)
                 taken.append(now() - began)
             pixels = coarse.covered_by(coarse.bounds)
             self.costs = self.costs.took("volume", 0.0, pixels, min(taken), gpu=gpu)
         return drawn
-
-    def _seen_in(self, frame: Frame) -> Frame | None:
-        """Return the frame of what is to be seen, and show its bounds to VTK."""
-        shown = self.showing(frame)
-        if shown is not None:
-            self.box.place(shown.bounds)
-            if shown.volume is None and shown.seen != self._counted:
-                self._counted = shown.seen
-                self._generation += 1
-        return shown
 
     def preview_size(self, frame: Frame) -> tuple[int, int]:
         """Return the size of this frame's image: that of the viewport, or less."""
         settings, window, renderer, share = self.settings, frame.window, frame.renderer, 1.0
         # What is kept is full: such a picture may have a camera that nothing was drawn with before
         kept = window.keeps_picture or not window.knows(renderer.GetActiveCamera())
-        if settings.previews and not (kept or frame.full):
+        if settings.adjust and settings.target_fps != 0 and not (kept or frame.full):
             each, expected = self.costs.volume, None
             if frame.volume is not None and each is not None:
                 expected = each * frame.covered_by(frame.bounds) + self.costs.fixed
@@ -281,28 +274,39 @@ class Driver:
             if bounds is None or frame is None or frame.rectangle(bounds) is None:
                 return None
             self._window = weakref.ref(frame.window)
-            seen = self._seen_in(frame)
+            seen = self._showing(frame)
             return None if seen is None or seen.volume is not None else seen
 
         return self._guarded(in_picture)  # type: ignore[no-any-return]
 
     # What a frame shows
 
-    def showing(self, frame: Frame) -> Frame | None:
-        """Return the frame of what is to be seen, brought up to date; ``None`` for nothing."""
-        source, renderers = self.input, self.renderers
+    def _showing(self, frame: Frame) -> Frame | None:
+        """Return the frame of what is to be seen, brought up to date; ``None`` for nothing.
+
+        VTK is shown its bounds.
+        """
+        source, renderer, matrix = self.input, frame.renderer, frame.model_transform
         if source is None:
             return None
-        source.note_scene(renderers, frame.model_transform)
-        source.set_view_if_missing(*frame.seen_from)
-        if not isinstance(source, VDISource):
-            return self._stored(source, frame)
-        # What is drawn in several views is out of date in none of them by itself
-        one_view = len(renderers) == 1 and source.alone
-        several = len(frame.window.shown_in(frame.renderer)) > 1
-        joint = several and len(group_of(frame).members) > 1
+        renderers = self.renderers
+        source.note_scene(renderers, matrix)
+        source.set_view_if_missing(renderer.GetActiveCamera(), size_of(renderer), matrix)
+        if isinstance(source, VDISource):
+            shown = self._of_volume(source, frame, renderers)
+        else:
+            shown = self._stored(source, frame)
+        if shown is not None:
+            self.box.place(shown.bounds)
+            if shown.volume is None and shown.seen != self._counted:
+                self._counted = shown.seen
+                self._generation += 1
+        return shown
+
+    def _of_volume(self, source: VDISource, frame: Frame, renderers: list[Any]) -> Frame | None:
+        """Return the frame of a volume or its VDI, as is planned by all that is seen."""
         try:
-            seen = self._look(source, frame, joint=joint, one_view=one_view)
+            seen = self._look(source, frame, renderers)
             while True:
                 planned = plan(seen)
                 self.costs = planned.costs
@@ -325,24 +329,24 @@ class Driver:
                         failed=self._stamp in self.failed,
                     )
         except Cancelled as error:
-            if self._volume is None and source.last() is None:
+            if self._volume is None and source.last is None:
                 raise
             self._complain(error)
-            planned, shown = Plan("vdi"), self._volume or source.last()
+            planned, shown = Plan("vdi"), self._volume or source.last
         if shown is None:
             return None
         # A volume has the light of its VDI in a window, so that nothing jumps
-        by_vdi = self.seen is not None and source.last() is not None
+        by_vdi = self.seen is not None and source.last is not None
         lit_from = frame.view.camera if not by_vdi or self.settings.draw == "volume" else None
         return frame.showing(shown, lit_from=lit_from, full=planned.full, stand_in=planned.stand_in)
 
     def _stored(self, source: Input, frame: Frame) -> Frame | None:
         """Return the frame of a VDI that has no volume, and say what it lacks."""
         stamp, self.view = source.stamp(), frame.view
-        source.look(frame.view.camera, self.device)
+        source.look(frame.view.camera, self.settings.device)
         if stamp is None or stamp not in self.failed:
             self._update(source)
-        vdi = source.last()
+        vdi = source.last
         if vdi is None:
             return None
         if self.settings.regenerate == "auto":
@@ -356,15 +360,21 @@ class Driver:
         full = not frame.window.previews(self.settings)
         return frame.showing(vdi, full=full, parts=tuple(parts) if blended else ())
 
-    def _look(self, source: VDISource, frame: Frame, *, joint: bool, one_view: bool) -> Seen:
+    def _look(self, source: VDISource, frame: Frame, renderers: list[Any]) -> Seen:
         """Look at all that decides what the frame shows."""
         window, settings, view = frame.window, self.settings, frame.view
-        watched = one_view and window.watched_behind(settings)
+        # What is drawn in several views is out of date in none of them by itself
+        one_view = len(renderers) == 1 and len(source.drivers) == 1
+        joint = len(window.shown_in(frame.renderer)) > 1 and len(group_of(frame).members) > 1
+        # Work may go on behind the frames where somebody watches, and can move
+        vtk_window = window.vtk_window()
+        here = bool(vtk_window.GetShowWindow()) and vtk_window.GetInteractor() is not None
+        watched = one_view and (here or settings.off_screen)
         stamp = source.stamp()
         if self._wanted is None or self._wanted[0] != stamp or self._wanted[1] is None:
             request, trouble = None, None
             try:
-                request = source.MakeRequest(None if watched or source.has_view else view)
+                request = source.MakeRequest()
             except (Cancelled, InvalidVolumeError):
                 raise
             except Exception as error:  # what is shown can still be drawn
@@ -382,10 +392,10 @@ class Driver:
         elif not moving and first:
             self._moved_at = min(self._moved_at, time - SETTLED)
         settled, self.view = time - self._moved_at >= SETTLED, view
-        if watched and trouble is not None and stamp != self._stamp and source.last() is not None:
+        if watched and trouble is not None and stamp != self._stamp and source.last is not None:
             self._complain(trouble)
         self._stamp = stamp
-        vdi, made_of = source.last(), source.made_of
+        vdi, made_of = source.last, source.made_of
         content, volume, late, each = None, "whole", False, self.costs.volume
         if wanted is not None:
             content = wanted.content
@@ -444,7 +454,8 @@ class Driver:
         if planned.give_up:
             self.drop()
         if planned.follow:
-            source.follow_if_changed(*frame.seen_from)
+            seen_by, size = frame.renderer.GetActiveCamera(), size_of(frame.renderer)
+            source.follow_if_changed(seen_by, size, frame.model_transform)
         if planned.make is not None:
             try:
                 request = source.MakeRequest(planned.make)
@@ -462,7 +473,7 @@ class Driver:
 
     def _estimate(self, source: VDISource, view: View) -> None:
         """Estimate, in the background, the error of the VDI in a view."""
-        made, request, mapper = source.last(), source.made_of, self.actor().GetMapper()
+        made, request, mapper = source.last, source.made_of, self.actor().GetMapper()
         assert made is not None and request is not None  # noqa: PT018
         planes = np.reshape(planes_of(mapper), (-1, 6))
         options = RenderOptions(planes, mapper, self.settings.opacity_multiplier)
@@ -483,7 +494,7 @@ class Driver:
         assert self._wanted is not None
         _, wanted, trouble = self._wanted
         if planned.show == "vdi":
-            return source.last()
+            return source.last
         if planned.show == "trouble":
             assert trouble is not None
             raise trouble
@@ -540,13 +551,14 @@ class Driver:
 
     def advance(self) -> bool:
         """Take what was made in the background; whether a frame has something new to look at."""
-        try:
-            another = None if self.input is None else self.input.advance()
-        except Exception as error:
-            self._complain(error)
+        if self.input is not None and self.input.playing:
+            try:
+                return bool(self.input.player.advance())
+            except Exception as error:
+                self._complain(error)
+                return False
+        if self._asked is None:
             return False
-        if another is not None or self._asked is None:
-            return bool(another)
         try:
             made = self.worker.take()
         except Exception as error:
@@ -566,15 +578,11 @@ class Driver:
         return True
 
     @property
-    def unsettled(self) -> bool:
-        """Whether what the view is missing at rest is still to be begun, by another frame."""
-        return self.seen is not None and not self.seen.settled
-
-    @property
     def goes_on(self) -> bool:
-        """Whether something goes on that the event loop has to look at."""
+        """Whether something goes on, or is to begin at rest, that the event loop has to look at."""
         playing = self.input is not None and self.input.playing
-        return self._asked is not None or playing or self.unsettled
+        unsettled = self.seen is not None and not self.seen.settled
+        return self._asked is not None or playing or unsettled
 
     def follow(self, window: Window | None = None) -> None:
         """Start the event loop's timer, if something goes on and no hand moves."""
@@ -585,9 +593,10 @@ class Driver:
     def _tick(self) -> None:
         """Look, from the event loop, at what goes on, and have shown what is new."""
         window = self._window()
-        if window is None or window.drawing:
+        if window is None or window.started is not None:
             return
-        another = self.advance() or (self.unsettled and now() - self._moved_at >= SETTLED)
+        settled = self.seen is None or self.seen.settled
+        another = self.advance() or (not settled and now() - self._moved_at >= SETTLED)
         if window.moving or not (another or self.goes_on):
             self._timer.stop()
         interactor = self._timer.interactor()
@@ -623,19 +632,19 @@ class Driver:
         """
         source, seen = self.input, self._look_for_view()
         if not isinstance(source, VDISource):
-            if source is None or (source.last() is not None and source.prop is None):
-                return None if source is None else source.last()
+            if source is None or (source.last is not None and source.prop is None):
+                return None if source is None else source.last
             return source.vdi()  # in the colours that its property has by now
         if source.has_view:
             # Unless frames keep it up to date, or will
             kept = self.settings.draw == "vdi" or self.making is not None
-            if source.last() is None or not kept:
+            if source.last is None or not kept:
                 self.drop()
                 if source.stamp() not in self.failed:
                     self._update(source)
         elif seen is not None:
             return source.vdi(source.view_for(*seen))
-        return source.last()
+        return source.last
 
     def values_asked_for(self) -> DeferredVDI | None:
         """Return the values that are classified, made now if they are not.
@@ -658,14 +667,14 @@ class Driver:
         if isinstance(source, VDISource):
             return seen
         source.set_view_if_missing(*seen)
-        if source.last() is None:
-            source.look(camera_of(seen[0], matrix), self.device)
+        if source.last is None:
+            source.look(camera_of(seen[0], matrix), self.settings.device)
         return seen
 
     def status(self) -> VDIStatus:
         """Return how the last frame was drawn, and what goes on."""
         last, view, window = self._last, self.view, self._window()
-        vdi = None if self.input is None else self.input.last()
+        vdi = None if self.input is None else self.input.last
         player = None if self.input is None else self.input.player
         shown = None if vdi is None or view is None else (vdi, view.camera, view.size)
         known = None if vdi is None else self.estimate
@@ -724,22 +733,19 @@ class Driver:
                 found.append(each)
         return found
 
-    def renderer(self) -> Any:
-        """Return the renderer that is drawing the actor, or would; ``None`` if it has none."""
-        renderers = self.renderers
-        if len(renderers) < 2:
-            return renderers[0] if renderers else None
-        drawing = [each for each in renderers if _is_drawing(each)]
+    def _renderer(self) -> Any:
+        """Return the renderer that is drawing the actor; ``None`` if none is."""
+        drawing = []
+        for each in self.renderers:
+            vtk_window = each.GetRenderWindow()
+            if vtk_window is not None and vtk_window.CheckInRenderStatus():
+                drawing.append(each)
+        if len(drawing) < 2:
+            return drawing[0] if drawing else None
         for each in drawing:
             window = Window.of(each.GetRenderWindow())
             window.shown_in(each)  # from now on it is known which one draws
             if window.active.Get() is each:
                 return each
         # The first frame that shows the actor twice: tell them apart by their viewports
-        there = (each for each in drawing if viewport(each) == tiled(each))
-        return next(there, (drawing or renderers)[0])
-
-
-def _is_drawing(renderer: Any) -> bool:
-    window = renderer.GetRenderWindow()
-    return window is not None and bool(window.CheckInRenderStatus())
+        return next((each for each in drawing if viewport(each) == tiled(each)), drawing[0])

@@ -13,13 +13,12 @@ from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.options import FrameRequest
-from pyvista_vdi.quality.costs import RenderMode
+from pyvista_vdi.quality.plan import RenderMode
 from pyvista_vdi.raycasting.multi_vdi import blended
 from pyvista_vdi.raycasting.raycast import render_vdi
 from pyvista_vdi.volume.classified_volume import DeviceVolume
 from pyvista_vdi.volume.render import picture_room, raycast_medium, raycast_volume
-from pyvista_vdi.vtk_pipeline.drawing.depth import ends_of_rays
-from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Image
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, Image, ends_of_rays
 from pyvista_vdi.vtk_pipeline.filters.source import Request
 
 
@@ -103,11 +102,6 @@ class Drawn:
     def preview(self) -> bool:
         """Whether it has fewer pixels than the viewport."""
         return self.full_size not in (None, self.image.shape[1::-1])
-
-    def shows(self, frame: Frame) -> bool:
-        """Whether this is the image of exactly this frame."""
-        a, b = self.depth, frame.depth  # by their keys both have one, or neither has
-        return self.key == frame.key and (a is None or b is None or np.array_equal(a, b))
 
 
 #: What a frame shows of which nothing can be drawn.

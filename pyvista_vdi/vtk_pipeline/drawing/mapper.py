@@ -21,33 +21,23 @@ from pyvista_vdi.vtk_pipeline.vtk import vtkOpenGLGPUVolumeRayCastMapper
 COARSEST = 4.0
 
 
-def _on_start(mapper: Any, event: str) -> None:
-    driver = mapper.driver
-    driver.begin(mapper)
-    driver.box.begin(driver.actor())
-
-
-def _on_end(mapper: Any, event: str) -> None:
-    mapper.driver.end()
-
-
 class VDIMapperMethods:
     """What makes a GPU volume mapper draw a VDI; mixed into VTK's and into PyVista's."""
 
     #: What draws; made with the mapper, before which PyVista's constructor sets some settings.
     driver: Any = None
 
-    def _become_vdi_mapper(self: Any) -> None:
-        """Install proxy and observers; to be called once, from ``__init__``."""
+    def __init__(self: Any, **given: Any) -> None:
+        super().__init__(**given)  # type: ignore[misc]
         self.driver: Driver = Driver()
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
         self.SetMaximumImageSampleDistance(COARSEST)
         super().SetScalarModeToUsePointData()  # type: ignore[misc]
         super().SetInputConnection(self.driver.box.GetOutputPort())  # type: ignore[misc]
-        # Plain functions: they get the mapper from VTK and hold nothing
-        self.AddObserver("VolumeMapperRenderStartEvent", _on_start)
-        self.AddObserver("VolumeMapperRenderEndEvent", _on_end)
+        # Methods of what does not hold the mapper, which they get from VTK
+        self.AddObserver("VolumeMapperRenderStartEvent", self.driver.begin)
+        self.AddObserver("VolumeMapperRenderEndEvent", self.driver.end)
 
     def SetSampleDistance(self, distance: float) -> None:
         """Set the length of a step, model units, from which the VDI is regenerated."""
@@ -96,20 +86,12 @@ class VDIMapperMethods:
         source = self.driver.input
         if source is None:
             return None
-        return source.last() if isinstance(source, VDISource) else source.vdi()
+        return source.last if isinstance(source, VDISource) else source.vdi()
 
     def GetSource(self) -> VDISource | None:
         """Return the :class:`VDISource` at the input, if it is one."""
         source = self.driver.input
         return source if isinstance(source, VDISource) else None
-
-    def SetDevice(self, device: Any) -> None:
-        """Choose the OpenCL device; ``None`` is the default one."""
-        self.driver.device = device
-
-    def GetDevice(self) -> Any:
-        """Return the device as it was set."""
-        return self.driver.device
 
     # VTK's own switch would draw its volume into a smaller framebuffer
 
@@ -142,6 +124,3 @@ class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
     A problem while drawing is reported once as a ``VDIWarning`` and the last good image stays:
     exceptions cannot pass through VTK's renderer. Where nothing is left to draw, nothing is shown.
     """
-
-    def __init__(self) -> None:
-        self._become_vdi_mapper()

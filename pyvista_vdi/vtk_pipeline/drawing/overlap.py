@@ -15,8 +15,7 @@ import numpy as np
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.options import FrameRequest
 from pyvista_vdi.raycasting.multi_vdi import OwnedImage, PlacedVDI, owned_image
-from pyvista_vdi.vtk_pipeline.drawing.depth import ends_of_rays, opaque_depth
-from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, depths_of
+from pyvista_vdi.vtk_pipeline.drawing.frame import Frame, depths_of, ends_of_rays, opaque_depth
 from pyvista_vdi.vtk_pipeline.drawing.images import Drawn
 from pyvista_vdi.vtk_pipeline.drawing.window import ShownVolume, now
 
@@ -106,7 +105,7 @@ def _drawn(frames: list[Frame]) -> OwnedImage:
     first = replace(frames[0], depth=opaque_depth(frames)).coarser(size)  # which samples the depth
     seen = [first, *(frame.coarser(size) for frame in frames[1:])]
     # One device draws them all, and the same in whatever order they were added
-    devices = {repr(frame.mapper.driver.device): frame.mapper.driver.device for frame in frames}
+    devices = {repr(d): d for d in (frame.mapper.driver.settings.device for frame in frames)}
     began = now()
     picture = owned_image(
         [PlacedVDI(f.vdi, f.camera, f.options) for f in seen if f.vdi is not None],

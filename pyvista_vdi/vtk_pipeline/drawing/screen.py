@@ -1,4 +1,4 @@
-"""How an image comes to the screen: texture, shader, and the pixels that OpenGL fills.
+"""How an image comes to the screen: a box that VTK draws, textures, and the box's shader.
 
 The fragment shader of VTK's ray caster is replaced by a lookup in the image of the viewport.
 """
@@ -10,77 +10,190 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.vtk_pipeline.vtk import VTK_FLOAT, vtkTextureObject
+from pyvista_vdi.model.view import bounds_corners
+from pyvista_vdi.vtk_pipeline.filters.algorithm import WHOLE_EXTENT, Algorithm
+from pyvista_vdi.vtk_pipeline.filters.inputs import Input
+from pyvista_vdi.vtk_pipeline.filters.view import as_array
+from pyvista_vdi.vtk_pipeline.vtk import VTK_FLOAT, vtkDataObject, vtkTextureObject
+
+_EXTENT = (0, 1, 0, 1, 0, 1)
+_EMPTY = (0, -1, 0, -1, 0, -1)
+
+#: Diagonals from the origin beyond which a box fills the viewport instead: VTK places boxes in
+#: float32, which rounds corners by a pixel in ten thousand there, and by more beyond.
+_FAR = 1000.0
+
+#: Edge of the box that VTK draws then, about the origin: so small that no eye is inside.
+_EDGE = 2e-3
 
 
-class _Texture:
-    """A texture that is made when it is first shown, and filled again in another window."""
+class Box(Algorithm):
+    """What is before the mapper in VTK's pipeline: an image of 2 x 2 x 2 voxels.
+
+    VTK's mappers bring their input up to date when they are asked for their bounds, as by
+    ``ResetCamera()``, which calls no method in Python. So this is connected to whatever is before
+    the source, executes whenever that does, and makes no VDI.
+
+    Attributes
+    ----------
+    image : vtkImageData
+        The output. It has no points where nothing is at the input.
+    components : int
+        Those of its scalars.
+    """
 
     def __init__(self) -> None:
-        self._texture: Any = None
+        super().__init__(nInputPorts=1, nOutputPorts=1, outputType="vtkImageData")
+        self._shown: Input | None = None
+        self.components = 1
+        self._stands = False
+        self._far: tuple[Any, Any] | None = None  # origin and spacing, in a frame of what is far
+        self.Update()
+        self.image = self.GetOutputDataObject(0)
 
-    def _in_context(self, window: Any) -> bool:
-        """Bind the texture to a window's current context; return whether it is filled there."""
-        if self._texture is None:
-            self._texture = vtkTextureObject()
-            self._texture.SetWrapS(vtkTextureObject.ClampToEdge)
-            self._texture.SetWrapT(vtkTextureObject.ClampToEdge)
-        if self._texture.GetContext() is not window:
-            self._texture.SetContext(window)
-            return False
-        return bool(self._texture.GetHandle() != 0)
+    def FillInputPortInformation(self, port: int, information: Any) -> int:
+        """Take whatever the source is to refuse, or nothing."""
+        information.Set(self.INPUT_REQUIRED_DATA_TYPE(), "vtkDataObject")
+        information.Set(self.INPUT_IS_OPTIONAL(), 1)
+        return 1
 
-    def let_go(self) -> None:
-        """Release the texture unit."""
-        if self._texture is not None:
-            self._texture.Deactivate()
+    def show(self, shown: Input | None) -> None:
+        """Take the bounds of another input from now on."""
+        self._shown = shown
+        self.connect()
+        if shown is not None and self.GetNumberOfInputConnections(0) == 0:
+            self.place(shown.bounds())
+        self.Modified()
 
-    def release(self) -> None:
-        """Free it, for the next frame to fill it anew."""
-        window = None if self._texture is None else self._texture.GetContext()
-        if window is not None:
-            self._texture.ReleaseGraphicsResources(window)
+    def connect(self) -> None:
+        """Follow what the input is made of, which may be something else by now."""
+        port = None if self._shown is None else self._shown.port
+        connected = self.GetNumberOfInputConnections(0) > 0
+        if port is not (self.GetInputConnection(0, 0) if connected else None):
+            self.SetInputConnection(port)
+            self.place(None)  # what fails from the first has no bounds either
+
+    def place(self, bounds: tuple[float, ...] | None) -> None:
+        """Set the bounds, model frame; ``None``: none."""
+        extent = _EMPTY if bounds is None else _EXTENT
+        if self.image.GetExtent() != extent or self.image.GetPointData().GetScalars() is None:
+            self.image.SetExtent(extent)
+            self._allocate()
+        if bounds is not None:
+            low, high = np.asarray(bounds[::2]), np.asarray(bounds[1::2])
+            self.image.SetDirectionMatrix(1, 0, 0, 0, 1, 0, 0, 0, 1)  # VTK passes on the input's
+            self.image.SetOrigin(*low)
+            self.image.SetSpacing(*np.maximum(high - low, np.finfo(np.float32).tiny))
+
+    def begin(self, actor: Any) -> None:
+        """Be what VTK can draw in a frame of an actor; between frames the bounds are the VDI's.
+
+        VTK writes an error where there are no points, and float32 cannot place what is far from the
+        origin: a box about the origin has the whole viewport drawn then, where the image that is
+        looked up is transparent beside the VDI.
+        """
+        self.end()  # of a frame that VTK has broken off
+        self._stands = self.image.GetNumberOfPoints() == 0
+        if self._stands:
+            self.place((0, 1, 0, 1, 0, 1))
+        if actor is None:
+            return
+        # VTK asks for four where the actor's property says that they are dependent
+        components = 1 if actor.GetProperty().GetIndependentComponents() else 4
+        if components != self.components:
+            self.components = components
+            self._allocate()
+        model, matrix = bounds_corners(self.image.GetBounds()), as_array(actor.GetMatrix())
+        # From the origin of the model frame, or of the world
+        far = any(
+            np.abs(at).max() > _FAR * np.linalg.norm(np.ptp(at, axis=0))
+            for at in (model, model @ matrix[:3, :3].T + matrix[:3, 3])
+        )
+        fill_viewport(actor, _EDGE if far else None)
+        if far:
+            self._far = self.image.GetOrigin(), self.image.GetSpacing()
+            self.image.SetOrigin([-_EDGE / 2] * 3)
+            self.image.SetSpacing([_EDGE] * 3)
+
+    def end(self) -> None:
+        """Take the bounds again, or none."""
+        if self._far is not None:
+            (origin, spacing), self._far = self._far, None
+            self.image.SetOrigin(origin)
+            self.image.SetSpacing(spacing)
+        if self._stands:
+            self._stands = False
+            self.place(None)
+
+    def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
+        """Announce the voxels."""
+        outputs.GetInformationObject(0).Set(WHOLE_EXTENT, _EXTENT, 6)
+        return 1
+
+    def _execute(self, inputs: Any, outputs: Any) -> None:
+        self.image = vtkDataObject.GetData(outputs, 0)
+        self.place(None if self._shown is None else self._shown.bounds())
+
+    def _allocate(self) -> None:
+        self.image.AllocateScalars(3, self.components)  # VTK_UNSIGNED_CHAR
+        self.image.GetPointData().GetScalars().Fill(0)
 
 
-class ImageTexture(_Texture):
-    """The image that the shader of an actor looks up."""
+class Textures:
+    """The image that the shader of an actor looks up, and a depth of one texel beside it.
 
-    _uploaded: NDArray[np.float32] | None = None
+    VTK's volume mapper copies the whole depth buffer in each frame, for the ray caster that our
+    shader replaces: under MSAA that takes longer than to draw the image. The texel is in its place.
+    """
 
-    def show(self, window: Any, image: NDArray[np.float32], *, smooth: bool) -> int:
+    def __init__(self) -> None:
+        self._image, self._depth = vtkTextureObject(), vtkTextureObject()
+        self._uploaded: NDArray[np.float32] | None = None
+        for texture in (self._image, self._depth):
+            texture.SetWrapS(vtkTextureObject.ClampToEdge)
+            texture.SetWrapT(vtkTextureObject.ClampToEdge)
+
+    def show(self, window: Any, mapper: Any, image: NDArray[np.float32], *, smooth: bool) -> int:
         """Bind an image for the shader, in the window's context; return its texture unit.
 
         ``image`` is RGBA, float32 (H, W, 4), its rows in the order that the shader takes them in.
         The same object as last time is not uploaded again. With ``smooth`` texels are interpolated
         linearly: a full frame's texels are the pixels.
         """
-        filled = self._in_context(window)
-        texture = self._texture
+        filled = _filled(self._image, window)
         kind = vtkTextureObject.Linear if smooth else vtkTextureObject.Nearest
-        texture.SetMinificationFilter(kind)
-        texture.SetMagnificationFilter(kind)
+        self._image.SetMinificationFilter(kind)
+        self._image.SetMagnificationFilter(kind)
         if not filled or image is not self._uploaded:
             height, width = image.shape[:2]
-            texture.Create2DFromRaw(width, height, 4, VTK_FLOAT, image)
+            self._image.Create2DFromRaw(width, height, 4, VTK_FLOAT, image)
             self._uploaded = image
-        texture.Activate()
-        return int(texture.GetTextureUnit())
-
-
-class NoDepth(_Texture):
-    """A depth texture of one texel, in place of the copy of the depth buffer that VTK would make.
-
-    VTK's volume mapper copies the whole depth buffer in each frame, for the ray caster that our
-    shader replaces: under MSAA that takes longer than to draw the image.
-    """
-
-    def show(self, window: Any, mapper: Any) -> None:
-        """Bind it for a mapper in the frame that begins; the image's texture is active already."""
-        if not self._in_context(window):
+        self._image.Activate()
+        if not _filled(self._depth, window):
             far = np.ones(1, dtype=np.float32)  # window depth of nothing
-            self._texture.CreateDepthFromRaw(1, 1, vtkTextureObject.Float32, VTK_FLOAT, far)
-        mapper.SetSharedDepthTexture(self._texture)
-        self._texture.Activate()
+            self._depth.CreateDepthFromRaw(1, 1, vtkTextureObject.Float32, VTK_FLOAT, far)
+        mapper.SetSharedDepthTexture(self._depth)
+        self._depth.Activate()
+        return int(self._image.GetTextureUnit())
+
+    def let_go(self) -> None:
+        """Release the texture units."""
+        self._image.Deactivate()
+        self._depth.Deactivate()
+
+    def release(self) -> None:
+        """Free them, for the next frame to fill them anew."""
+        for texture in (self._image, self._depth):
+            if texture.GetContext() is not None:
+                texture.ReleaseGraphicsResources(texture.GetContext())
+
+
+def _filled(texture: vtkTextureObject, window: Any) -> bool:
+    """Bind a texture to a window's current context; return whether it is filled there."""
+    if texture.GetContext() is not window:
+        texture.SetContext(window)
+        return False
+    return bool(texture.GetHandle() != 0)
 
 
 #: Where the viewport is in the framebuffer, pixels: left edge, upper edge, 1 / width, -1 / height.

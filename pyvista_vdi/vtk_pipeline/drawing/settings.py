@@ -14,7 +14,6 @@ from pyvista_vdi.model.options import (
     DrawingOptions,
     Option,
     RenderOptions,
-    declared,
 )
 from pyvista_vdi.model.types import Draw, Policy
 
@@ -28,18 +27,14 @@ class MapperSettings:
     regenerate_below: float | None = None
     opacity_multiplier: float = 1.0
     transmittance_cutoff: float = TRANSMITTANCE_CUTOFF
-    target_fps: float | None = None  # the window's desired update rate
+    target_fps: float | None = None  # the window's desired update rate; 0: no previews
     image_distance: float = 1.0
     adjust: bool = True
     off_screen: bool = False
-
-    @property
-    def previews(self) -> bool:
-        """Whether a frame of a motion may have fewer rays."""
-        return self.adjust and self.target_fps != 0
+    device: Any = None
 
 
-_DECLARED = declared(RenderOptions, DrawingOptions)
+_DECLARED = RenderOptions.declared | DrawingOptions.declared
 
 #: The settings, by VTK's names.
 SETTINGS: Mapping[str, Option] = {
@@ -54,7 +49,7 @@ SETTINGS: Mapping[str, Option] = {
         1.0,
         "for how many pixels along each edge a ray is cast, 1 to 100",
         "The picture is interpolated linearly, as by VTK's mappers.",
-        check=Number("a number from 1 to 100", 1, 100, name="the image sample distance"),
+        check=Number(low=1, high=100, name="the image sample distance"),
     ),
     "AutoAdjustSampleDistances": Option(
         "adjust",
@@ -70,6 +65,7 @@ SETTINGS: Mapping[str, Option] = {
         "whether off-screen windows are treated as if somebody watched them",
         check=partial(as_flag, name="InteractiveOffScreen"),
     ),
+    "Device": Option("device", None, "the OpenCL device; ``None`` is the default one"),
 }
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import get_runtime
 from pyvista_vdi.model.vdi import VDI
-from pyvista_vdi.quality.costs import RenderMode
+from pyvista_vdi.quality.plan import RenderMode
 from pyvista_vdi.quality.rate import Pace
 from pyvista_vdi.quality.targets import describe
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
@@ -49,9 +49,8 @@ _RATE = 30.0
 _windows: weakref.WeakValueDictionary[str, Window] = weakref.WeakValueDictionary()
 
 
-def now() -> float:
-    """Return the seconds of the clock that frames are measured by."""
-    return time.perf_counter()
+#: The clock that frames are measured by, seconds.
+now = time.perf_counter
 
 
 class ShownVolume(NamedTuple):
@@ -106,6 +105,8 @@ class Window:
         What those who draw share within a frame; empty between two.
     active : vtkWeakReference
         The renderer that is between its start and its end.
+    started : float or None
+        When the frame that is drawn began, seconds; ``None`` between two.
     """
 
     def __init__(self, window: Any) -> None:
@@ -113,17 +114,17 @@ class Window:
         self.pace = Pace()
         self.of_frame: dict[Any, Any] = {}
         self.active = vtkWeakReference()
+        self.started: float | None = None
         self.vtk_window = weakly(window)
         self._renderers: dict[str, Callable[[], Any]] = {}  # that have drawn a VDI
         self._known: list[Callable[[], Any]] = []
         self._given_up: int | None = None  # the window's multisampling, in a frame without it
         self._blit: Any = None  # how the window shows its frames, in one that goes another way
-        self._started: float | None = None
         self._previewed = False
         self._picture_wanted = False
         self._foreground = contextlib.ExitStack()  # from the frame's start to its end
-        window.AddObserver("StartEvent", lambda *_: self._start())
-        window.AddObserver("EndEvent", lambda *_: self._end())
+        window.AddObserver("StartEvent", self._start)
+        window.AddObserver("EndEvent", self._end)
 
     @classmethod
     def of(cls, window: Any) -> Window:
@@ -138,20 +139,12 @@ class Window:
         """Return the volumes that a renderer of this window shows, in its order."""
         address = renderer.GetAddressAsString("")
         key, known = ("shown", address), self._renderers.get(address)
-        if key not in self.of_frame or not self.drawing:
+        if key not in self.of_frame or self.started is None:
             if known is None or known() is not renderer:
                 self._renderers[address] = weakly(renderer)
-                weak = weakref.ref(self)
-
-                def camera_changed(*_: Any) -> None:
-                    window = weak()
-                    if window is not None:
-                        window._camera_changed()
-
-                renderer.AddObserver("ActiveCameraEvent", camera_changed)
-                active = self.active  # no cycle through the observers
-                renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
-                renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
+                renderer.AddObserver("StartEvent", self._drawing)
+                renderer.AddObserver("EndEvent", self._drawing)
+                renderer.AddObserver("ActiveCameraEvent", self._camera_changed)
             self.of_frame[key] = list(_volumes_of(renderer.GetViewProps()))
         return self.of_frame[key]  # type: ignore[no-any-return]
 
@@ -164,18 +157,7 @@ class Window:
                 found += [(renderer, v) for v in self.shown_in(renderer) if v.driver is not None]
         return found
 
-    @property
-    def drawing(self) -> bool:
-        """Whether a frame has begun and not ended."""
-        return self._started is not None
-
     # What is seen of it
-
-    def watched_behind(self, settings: Any) -> bool:
-        """Whether work may go on behind the frames: somebody watches, and can move."""
-        window = self.vtk_window()
-        here = bool(window.GetShowWindow()) and window.GetInteractor() is not None
-        return here or settings.off_screen
 
     def rate(self, settings: Any) -> float:
         """Return the frames per second to be kept while a hand moves, also before it does."""
@@ -191,15 +173,14 @@ class Window:
 
     def previews(self, settings: Any) -> bool:
         """Whether frames may have fewer rays now: a hand moves, and somebody watches."""
-        if not (settings.previews and self.moving):
+        if not (settings.adjust and settings.target_fps != 0 and self.moving):
             return False
         return bool(self.vtk_window().GetShowWindow()) or settings.off_screen
 
     @property
     def whole_picture(self) -> bool:
         """Whether this frame is a whole picture by itself, and not a tile of one."""
-        window = self.vtk_window()
-        return window is None or tuple(window.GetTileScale()) == (1, 1)
+        return tuple(self.vtk_window().GetTileScale()) == (1, 1)
 
     @property
     def keeps_picture(self) -> bool:
@@ -222,8 +203,8 @@ class Window:
 
     # Its frames
 
-    def _start(self) -> None:
-        self._started = now()
+    def _start(self, *_: Any) -> None:
+        self.started = now()
         self.of_frame.clear()
         self.number += 1
         # Between two frames only: no frame shows two generations, nor does a picture in tiles
@@ -233,7 +214,7 @@ class Window:
             for driver in drivers:
                 driver.advance()
         self._foreground.close()
-        for runtime in {get_runtime(driver.device) for driver in drivers}:
+        for runtime in {get_runtime(driver.settings.device) for driver in drivers}:
             self._foreground.enter_context(runtime.foreground())
         samples = window.GetMultiSamples()
         if samples and self.pace.slow_samples:
@@ -262,7 +243,7 @@ class Window:
             window.SetFrameBlitModeToBlitToCurrent()
         self.pace.began(samples)
 
-    def _end(self) -> None:
+    def _end(self, *_: Any) -> None:
         window = self.vtk_window()
         given_up, self._given_up = self._given_up, None
         if given_up is not None and not window.GetMultiSamples():  # it is as it was left here
@@ -271,20 +252,23 @@ class Window:
         if blit is not None and window.GetFrameBlitMode() == window.BlitToCurrent:
             window.SetFrameBlitMode(blit)
         self._foreground.close()
-        started, self._started = self._started, None
+        started, self.started = self.started, None
         self._previewed = self.pace.frame.preview or given_up is not None
         seconds = None if started is None else now() - started
         self.pace.ended(seconds, self.moving)
         self.of_frame.clear()
 
-    def _camera_changed(self) -> None:
+    def _drawing(self, renderer: Any, event: str) -> None:
+        self.active.Set(renderer if event == "StartEvent" else None)
+
+    def _camera_changed(self, *_: Any) -> None:
         """Replace a preview on the screen by the full frame before a screenshot reads it.
 
         ``vtkWindowToImageFilter`` puts a copy of its own in place of each renderer's camera, and
         may then take the picture that is on the screen, as ``Plotter.screenshot`` has it.
         """
         window = self.vtk_window()
-        if not self._previewed or self._started is not None or window is None:
+        if not self._previewed or self.started is not None or window is None:
             return
         interactor = window.GetInteractor()
         if interactor is not None and not interactor.GetEnableRender():

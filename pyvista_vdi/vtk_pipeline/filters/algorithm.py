@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -123,21 +123,17 @@ def named_pair(name: str, what: str, *methods: Callable[..., Any]) -> Any:
     return methods
 
 
-class HeldByVTK:
-    """A VTK object that an attribute keeps alive in C++ alone: what the user hands to an algorithm.
+def held_by_vtk(*things: Any) -> vtk.vtkCollection:
+    """Return what keeps VTK objects alive in C++ alone: what the user hands to an algorithm.
 
     Before 9.7 VTK frees a node of its table of wrappers twice (``vtkPythonUtil::FindObject``)
     where the attributes of an algorithm that is gone are the last in Python to hold an object
     of a Python class, such as a ``pyvista.VolumeProperty``, that lives on in C++.
     """
-
-    def __init__(self, thing: Any) -> None:
-        self._holder = vtk.vtkCollection()
-        self._holder.AddItem(thing)
-
-    def get(self) -> Any:
-        """Return the object."""
-        return self._holder.GetItemAsObject(0)
+    held = vtk.vtkCollection()
+    for thing in things:
+        held.AddItem(thing)
+    return held
 
 
 class SceneAlgorithm(Algorithm):
@@ -154,8 +150,8 @@ class SceneAlgorithm(Algorithm):
     )
     _, GetCamera = accessors("camera", "the view, as it was set; ``None`` where none was")
 
-    _property: HeldByVTK | None = None
-    _observed: Sequence[tuple[HeldByVTK, int]] = ()
+    _property: vtk.vtkCollection | None = None  # with it alone
+    _observed: tuple[vtk.vtkCollection, list[int]] | None = None  # and their observers
 
     def SetCamera(
         self, camera: CameraLike | None, model_transform: ArrayLike | None = None
@@ -189,19 +185,20 @@ class SceneAlgorithm(Algorithm):
         if prop is not None:
             check_property(prop, rgba=not prop.GetIndependentComponents())
         if prop is not self.GetVolumeProperty():
-            self._property = None if prop is None else HeldByVTK(prop)
+            self._property = None if prop is None else held_by_vtk(prop)
             self._observe_property()
             self.Modified()
 
     def GetVolumeProperty(self) -> Any:
         """Return the volume property."""
-        return None if self._property is None else self._property.get()
+        return None if self._property is None else self._property.GetItemAsObject(0)
 
     def _observe_property(self) -> None:
         """Modify this algorithm whenever the property or one of its functions is modified."""
-        for watched, tag in self._observed:
-            watched.get().RemoveObserver(tag)
-        self._observed, prop = [], self.GetVolumeProperty()
+        if self._observed is not None:
+            for i, tag in enumerate(self._observed[1]):
+                self._observed[0].GetItemAsObject(i).RemoveObserver(tag)
+        self._observed, prop = None, self.GetVolumeProperty()
         if prop is None:
             return
         there = [prop, color_function(prop), prop.GetScalarOpacity()]
@@ -212,7 +209,7 @@ class SceneAlgorithm(Algorithm):
             algorithm._observe_property()  # its functions may be others now
             algorithm.Modified()
 
-        self._observed = [(HeldByVTK(each), watch(each, self, changed)) for each in there]
+        self._observed = held_by_vtk(*there), [watch(each, self, changed) for each in there]
 
 
 def watch(

@@ -178,7 +178,7 @@ def as_numpy(array: vtk.vtkDataArray) -> NDArray[Any]:
         plain.DeepCopy(array)
         return vtk.vtk_to_numpy(plain)  # type: ignore[no-any-return]
     values: NDArray[Any] = vtk.vtk_to_numpy(array)
-    # NumPy's own array rather than one that keeps VTK's, which has an attribute: see HeldByVTK
+    # NumPy's own array rather than one that keeps VTK's, which has an attribute: see held_by_vtk
     lent = getattr(array, "_numpy_reference", values)
     theirs, ours = ((a.dtype, a.size, a.ctypes.data) for a in (lent, values))
     return lent.reshape(values.shape) if theirs == ours else values
@@ -216,7 +216,7 @@ def vdi_to_image(vdi: VDI | DeferredVDI) -> vtk.vtkImageData:
         arrays share the VDI's memory, so they must not be written to. A ``.vti`` file keeps every
         bit.
     """
-    lists: VDI = vdi.with_precision("exact").lists
+    lists = vdi.with_precision("exact")
     kept = {"deferred": vdi.about} if isinstance(vdi, DeferredVDI) else {}
     width, height = lists.window_size
     image = vtk.vtkImageData()
@@ -225,7 +225,7 @@ def vdi_to_image(vdi: VDI | DeferredVDI) -> vtk.vtkImageData:
     image.GetPointData().SetScalars(to_vtk(COUNT, counts))
     field = image.GetFieldData()
     for name in _RAGGED:
-        field.AddArray(to_vtk(name, getattr(lists, name)))
+        field.AddArray(to_vtk(name, getattr(lists.arrays, name)))
     # Everything that is not an array, as a field string of JSON
     about = {
         "form_version": FORM_VERSION if kept else 1,

@@ -13,7 +13,7 @@ from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.packing import PRECISIONS
-from pyvista_vdi.model.vdi import DeferredVDI, picture_size
+from pyvista_vdi.model.vdi import DeferredVDI, picture_view
 from pyvista_vdi.vtk_pipeline.filters.algorithm import (
     PIPELINE,
     Algorithm,
@@ -71,7 +71,7 @@ class VDIReader(VDIFileAlgorithm):
             path = self._path()
             about = read_info(path)
             self._series = read(path) if holds(path) == "series" else None
-        self.picture_size = picture_size(about.window_size, about.metadata) if about else None
+        self.picture_size = picture_view(about)[1] if about else None
         announce(outputs, about.window_size if about else (1, 1))
         times = () if self._series is None else self._series.times or ()
         information = outputs.GetInformationObject(0)

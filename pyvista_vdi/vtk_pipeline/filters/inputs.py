@@ -33,11 +33,13 @@ class Input:
     prop: Any = None
     #: The port of what the bounds depend on; ``None`` where they depend on nothing.
     port: Any = None
-    #: Whether one step of a series is shown after the other: the event loop has to look at that.
+    #: Whether the player shows one step of a series after the other: the event loop has to look at
+    #: that.
     playing = False
 
     def __init__(self, vdi: VDI | None = None, port: Any = None) -> None:
-        self._vdi = vdi
+        #: The VDI made last.
+        self.last = vdi
         #: What draws it.
         self.drivers: weakref.WeakSet[Any] = weakref.WeakSet()
         if port is not None:  # of canonical images
@@ -49,13 +51,9 @@ class Input:
         if self.port is not None:
             self._producer.Update(self.port.GetIndex())
             image = self._producer.GetOutputDataObject(self.port.GetIndex())
-            if self._vdi is None or self._read_at != image.GetMTime():
-                self._vdi, self._read_at = as_vdi(vdi_from_image(image)), image.GetMTime()
-        return self._vdi
-
-    def last(self) -> VDI | None:
-        """Return the VDI made last."""
-        return self._vdi
+            if self.last is None or self._read_at != image.GetMTime():
+                self.last, self._read_at = as_vdi(vdi_from_image(image)), image.GetMTime()
+        return self.last
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds in the model frame, without making a VDI of a volume."""
@@ -65,7 +63,7 @@ class Input:
     def stamp(self) -> Any:
         """Return something that changes whenever it is worth trying again."""
         if self.port is None:
-            return None if self._vdi is None else id(self._vdi)
+            return None if self.last is None else id(self.last)
         self._producer.UpdateInformation()
         time = wanted_time(self._producer.GetOutputInformation(self.port.GetIndex()))
         return self._producer.GetMTime(), time
@@ -80,7 +78,7 @@ class Input:
 
     def on_devices(self) -> list[Any]:
         """Return the VDIs, values and volumes that devices may hold because of this."""
-        return [self._vdi]
+        return [self.last]
 
     def tell(self) -> None:
         """Tell what draws it that what is before it may be another, or that it plays."""
@@ -92,13 +90,6 @@ class Input:
 
     def look(self, camera: Camera, device: Any) -> None:
         """Choose what a view shows, before a frame."""
-
-    def advance(self) -> bool | None:
-        """Take what is due between two frames; whether there is another VDI to be drawn.
-
-        ``None`` where nothing goes on by itself.
-        """
-        return None
 
     def parts(self) -> list[tuple[VDI, float]]:
         """Return the VDIs that a picture is blended of, with weights; none for one."""
@@ -143,15 +134,15 @@ class DeferredInput(Input):
 
     def on_devices(self) -> list[Any]:
         """Return the VDI and its values."""
-        return [] if self._vdi is None else [self._vdi, self.deferred]
+        return [] if self.last is None else [self.last, self.deferred]
 
     def vdi(self) -> VDI | None:
         """Return the VDI that the property makes of the values now; ``None`` without a view."""
         values, stamp = self.deferred, self.stamp()
-        if values is not None and (self._vdi is None or self._made_at != stamp):
-            self._vdi = classify_on_device(values, transfer_function_from_property(self.prop))
+        if values is not None and (self.last is None or self._made_at != stamp):
+            self.last = classify_on_device(values, transfer_function_from_property(self.prop))
             self._made_at = stamp
-        return self._vdi
+        return self.last
 
     def bounds(self) -> tuple[float, ...] | None:
         """Return the bounds in the model frame."""

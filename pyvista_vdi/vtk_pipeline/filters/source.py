@@ -23,6 +23,7 @@ from pyvista_vdi.errors import (
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.checks import one_of
+from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.lighting import Lights
 from pyvista_vdi.model.options import (
@@ -179,7 +180,7 @@ class VDISource(SceneAlgorithm, Input):
         self._volume_key: Any = None
         self._table: TransferFunction | None = None
         self._table_key: Any = None
-        self._vdi: VDI | None = None
+        self.last: VDI | None = None  # made last
         self.made_of: Request | None = None  # what the VDI made last is of
         self._frame_camera: Camera | None = None  # what frames gave, which nobody has set
         self._frame_size: tuple[int, int] | None = None
@@ -222,20 +223,55 @@ class VDISource(SceneAlgorithm, Input):
         """
         self.Update()
         # VTK looks at the input's data, and nobody at lights, only where there is reason to execute
-        return self._made(self._make_request(self.UpdateInput()))
+        return self._made(self.MakeRequest())
 
-    def MakeRequest(self, view: View | None = None) -> Request:
+    def MakeRequest(self, view: View | None = None, image: Any = None) -> Request:
         """Return what the next VDI would be made of, from another view if one is given.
 
-        This brings the pipeline before the source up to date, and generates nothing; it raises what
-        :meth:`GetVDI` would raise before it generates.
+        This brings the pipeline before the source up to date, unless the ``image`` at the input is
+        given, and generates nothing; it raises what :meth:`GetVDI` would raise before it generates.
         """
-        return self._make_request(self.UpdateInput(), view)
+        image = self.UpdateInput() if image is None else image
+        prop, target = self.GetVolumeProperty(), self.GetDial()
+        camera = self.GetCamera() if view is None else view.camera
+        window_size = self.GetWindowSize() if view is None else view.size
+        needed = {
+            "camera (SetCamera)": camera,
+            "window size (SetWindowSize)": window_size,
+            "volume property (SetVolumeProperty)": prop,
+        }
+        missing = [what for what, value in needed.items() if value is None]
+        if camera is None or window_size is None or missing:
+            raise InvalidArgumentError(f"VDISource has no {', no '.join(missing)}")
+        volume = self._read(image)
+        # Take the property's functions over the volume's scalars, the same until they change
+        key = (self._volume_key, prop.GetMTime())
+        if self._table is None or key != self._table_key:
+            self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
+            self._table_key = key
+        table = self._table
+        lights = self.GetLights() if table.shading else Lights()
+        options = replace(self.GetOptions(), lights=lights)
+        # Where lights of the scene shine on it, the volume is lit where it stands now
+        placed = self.placed if lights.of_scene else None
+        generating = (camera, window_size)
+        if placed is not None:
+            generating = (camera.replace(model_transform=placed), window_size)
+        if self.GetCoverage() == "bounds":
+            # The corners of the box of points, model frame: tighter than bounds if rotated
+            box = bounds_corners([end for n in volume.dimensions for end in (0, n - 1)])
+            corners = np.column_stack([box, np.ones(8)]) @ volume.index_to_model.T[:, :3]
+            generating = covering_view(*generating, corners) or generating
+        device, metadata = self.GetDevice(), {"scalars": volume.name, **self.GetMetadata()}
+        content = (self._volume_key, table, options, placed, target, device, metadata)
+        settings = (options, device, None, metadata, View(camera, window_size), target)
+        request = Request(volume, table, camera, window_size, *settings, content)
+        return request.seen_from(*generating)
 
     def TakeVDI(self, vdi: VDI, request: Request) -> None:
         """Take a VDI that was made of a request elsewhere; its view is that of those to come."""
         self._set |= {"window_size": request.screen.size, "camera": request.screen.camera}
-        self._vdi, self.made_of = vdi, request
+        self.last, self.made_of = vdi, request
         self.Modified()  # the output is another
 
     def MakeVDI(self, request: Request) -> VDI:
@@ -275,11 +311,6 @@ class VDISource(SceneAlgorithm, Input):
         """The port that the volume comes from."""
         connected = self.GetNumberOfInputConnections(0) > 0
         return self.GetInputConnection(0, 0) if connected else None
-
-    @property
-    def alone(self) -> bool:
-        """Whether no other mapper draws this."""
-        return len(self.drivers) == 1
 
     def vdi(self, view: View | None = None) -> VDI:
         """Return the VDI of the data that are at the input by now, or one of another view.
@@ -325,10 +356,10 @@ class VDISource(SceneAlgorithm, Input):
 
     def note_scene(self, renderers: Sequence[Any], model_transform: NDArray[np.float64]) -> None:
         """Note a renderer that shows it, for its lights, unless none does, and where it stands."""
-        lit_by = self.lit_by.Get()
-        if self.of_scene and lit_by not in renderers and (self.alone or lit_by is None):
+        lit_by, alone = self.lit_by.Get(), len(self.drivers) == 1
+        if self.of_scene and lit_by not in renderers and (alone or lit_by is None):
             self.lit_by.Set(renderers[0] if renderers else None)
-        if self.alone:
+        if alone:
             self.placed = tuple(map(tuple, model_transform.tolist()))
 
     def keep_lights(self, closed: Sequence[Any]) -> None:
@@ -403,7 +434,7 @@ class VDISource(SceneAlgorithm, Input):
 
     def on_devices(self) -> list[Any]:
         """Return the VDI, and the volume that it was made of."""
-        return [self._vdi, None if self.made_of is None else self.made_of.volume]
+        return [self.last, None if self.made_of is None else self.made_of.volume]
 
     # VTK's requests
 
@@ -415,7 +446,7 @@ class VDISource(SceneAlgorithm, Input):
         return 1
 
     def _execute(self, inputs: Any, outputs: Any) -> None:
-        vdi = self._made(self._make_request(vtkDataObject.GetData(inputs[0], 0)))
+        vdi = self._made(self.MakeRequest(image=vtkDataObject.GetData(inputs[0], 0)))
         vtkImageData.GetData(outputs, 0).ShallowCopy(vdi_to_image(vdi))
         # Coverage and a dial have chosen it only now
         announce(outputs, vdi.window_size)
@@ -423,46 +454,9 @@ class VDISource(SceneAlgorithm, Input):
 
     def _made(self, request: Request) -> VDI:
         """Return a request's VDI, made now unless it is the one that was made last."""
-        if self._vdi is None or self.made_of is None or request.key != self.made_of.key:
-            self._vdi, self.made_of = self.MakeVDI(request), request
-        return self._vdi
-
-    def _make_request(self, image: Any, view: View | None = None) -> Request:
-        prop, target = self.GetVolumeProperty(), self.GetDial()
-        camera = self.GetCamera() if view is None else view.camera
-        window_size = self.GetWindowSize() if view is None else view.size
-        needed = {
-            "camera (SetCamera)": camera,
-            "window size (SetWindowSize)": window_size,
-            "volume property (SetVolumeProperty)": prop,
-        }
-        missing = [what for what, value in needed.items() if value is None]
-        if camera is None or window_size is None or missing:
-            raise InvalidArgumentError(f"VDISource has no {', no '.join(missing)}")
-        volume = self._read(image)
-        # Take the property's functions over the volume's scalars, the same until they change
-        key = (self._volume_key, prop.GetMTime())
-        if self._table is None or key != self._table_key:
-            self._table = transfer_function_from_property(prop, volume, rgba=volume.rgba)
-            self._table_key = key
-        table = self._table
-        lights = self.GetLights() if table.shading else Lights()
-        options = replace(self.GetOptions(), lights=lights)
-        # Where lights of the scene shine on it, the volume is lit where it stands now
-        placed = self.placed if lights.of_scene else None
-        generating = (camera, window_size)
-        if placed is not None:
-            generating = (camera.replace(model_transform=placed), window_size)
-        if self.GetCoverage() == "bounds":
-            # The corners of the box of points, model frame: tighter than bounds if rotated
-            box = bounds_corners([end for n in volume.dimensions for end in (0, n - 1)])
-            corners = np.column_stack([box, np.ones(8)]) @ volume.index_to_model.T[:, :3]
-            generating = covering_view(*generating, corners) or generating
-        device, metadata = self.GetDevice(), {"scalars": volume.name, **self.GetMetadata()}
-        content = (self._volume_key, table, options, placed, target, device, metadata)
-        settings = (options, device, None, metadata, View(camera, window_size), target)
-        request = Request(volume, table, camera, window_size, *settings, content)
-        return request.seen_from(*generating)
+        if self.last is None or self.made_of is None or request.key != self.made_of.key:
+            self.last, self.made_of = self.MakeVDI(request), request
+        return self.last
 
     def _read(self, image: Any) -> Volume:
         """Return the volume; the same object as long as it is the same (it is on the device)."""
@@ -503,7 +497,7 @@ for _told in GenerationOptions.declared.values():
 
 
 def input_of(data: Any) -> Input:
-    """Return what to draw for a VDI, an image of one, a port, or what extensions show."""
+    """Return what to draw for a VDI, an image of one, a port, a series or a set."""
     if isinstance(data, vtkAlgorithmOutput):
         producer = data.GetProducer()
         if isinstance(producer, VDISource):
@@ -515,9 +509,8 @@ def input_of(data: Any) -> Input:
         return data
     if isinstance(data, VDI | DeferredVDI) or is_vdi_image(data):
         return Input(as_vdi(data))  # of values this raises, and says what to do
-    show = registry.shown(data)
-    if show is not None:
-        return show(data)  # type: ignore[no-any-return]
+    if isinstance(data, VDICollection):
+        return registry.load(data.drawn_by)(data)  # type: ignore[no-any-return]
     raise InvalidVDIError(
         f"a VDIMapper draws a VDI, its canonical image, a series, a set or a VDISource's output; "
         f"got {type(data).__name__}: put a VDISource between a volume and the mapper"

@@ -16,13 +16,12 @@ from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 from pyvista_vdi.model.metrics import compare_images
 from pyvista_vdi.model.options import Deferral
 from pyvista_vdi.model.vdi import lengths_of
-from pyvista_vdi.model.volume import Grid
 from pyvista_vdi.quality.targets import turned
 
 
 def blocks_of(volume, chunks, function=None, block_bytes=1):
     cuts = cuts_of(volume.array.shape, chunks, volume.array.dtype.itemsize, block_bytes)
-    return Blocks.of(Grid.of(volume), cuts, function or transfer_for(volume))
+    return Blocks.of(volume, cuts, function or transfer_for(volume))
 
 
 @pytest.mark.parametrize("shading", [None, Shading()], ids=["", "shaded"])
@@ -201,7 +200,7 @@ def test_blocks_keep_the_values_of_one_piece(budget, default_runtime):
     assert found.metadata["blocks"] == [3, 3, 2]
 
     def sums(vdi):
-        length, mean = lengths_of(vdi.lists) * vdi.share, vdi.mean.astype(float)
+        length, mean = lengths_of(vdi) * vdi.share, vdi.mean.astype(float)
         ends = vdi.offsets.astype(int)
         of_rows = (length, length * mean, length * (mean**2 + vdi.spread.astype(float) ** 2))
         return [np.diff(np.append(0, np.cumsum(each))[ends]) for each in of_rows]

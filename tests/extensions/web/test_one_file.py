@@ -6,7 +6,6 @@ from strategies import random_vdi
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import VDIFileError
-from pyvista_vdi.extensions.web.page import page as page_of
 
 SIZE = (160, 90)
 VIEWPORT = {"width": 320, "height": 180}
@@ -38,8 +37,9 @@ def test_the_picture_is_python_s(vdi, open_file, tmp_path):
     assert page.evaluate("[viewer.clientWidth, viewer.clientHeight]") == [320, 180]
 
 
-def test_without_scripts_there_is_the_still_picture(vdi, open_file):
-    page = open_file(page_of(vdi), java_script_enabled=False).page
+def test_without_scripts_there_is_the_still_picture(vdi, open_page, tmp_path):
+    url = vdi.save(tmp_path / "a.html").as_uri()
+    page = open_page(url=url, viewport=VIEWPORT, java_script_enabled=False).page
     image = page.locator("vdi-viewer > img")
     assert image.is_visible()
     assert (image.bounding_box()["width"], image.bounding_box()["height"]) == SIZE

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Any
 
-from pyvista_vdi.model.checks import Number
-from pyvista_vdi.model.options import GenerationOptions, declared
+from pyvista_vdi.model.options import GenerationOptions
 
 #: Value of the property View that means the camera properties.
 CAMERA = 1
 
-_DECLARED = declared(GenerationOptions)
+_DECLARED = GenerationOptions.declared
 
 
 def properties(lines: str) -> str:
@@ -66,10 +66,9 @@ def _sentence(option: str, more: str = "") -> str:
 
 def _number(option: str, more: str = "") -> str:
     """Return the columns of an option that is a number; 0 stands for ``None``."""
-    default, check = _DECLARED[option].default, _DECLARED[option].check
-    ends = "0.."
-    if isinstance(check, Number) and math.isfinite(check.high):
-        ends = f"{check.low:g}..{check.high:g}"
+    default = _DECLARED[option].default
+    number: Any = _DECLARED[option].check
+    ends = f"{number.low:g}..{number.high:g}" if math.isfinite(number.high) else "0.."
     kind = "Int" if isinstance(default, int) else "Double"
     return f"{kind} {default or 0:g}  {ends}  {_sentence(option, more)}"
 
