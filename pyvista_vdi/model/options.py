@@ -376,9 +376,7 @@ class RenderOptions(Options):
     cropping: Any = option(None, Cropping.from_any, "CroppingLike | None")
     opacity_multiplier: float = option(1.0, Number("a factor of the extinction"))
     preview_samples: int | None = option(None, Number(low=1, high=MAX_PREVIEW_SAMPLES, whole=True))
-    transmittance_cutoff: float = option(
-        TRANSMITTANCE_CUTOFF, Number("a share of the light", high=np.nextafter(1.0, 0.0))
-    )
+    transmittance_cutoff: float = option(TRANSMITTANCE_CUTOFF, Number(high=1, below=True))
     skip_empty: bool = field(default=True)
 
     replace = replace

@@ -108,7 +108,7 @@ REFUSED = {
         ({"opacity_multiplier": -1}, "opacity_multiplier"),
         ({"preview_samples": "8"}, "preview_samples must be .* got '8'"),
         ({"preview_samples": MAX_PREVIEW_SAMPLES + 1}, "preview_samples must be"),
-        ({"transmittance_cutoff": 1}, "transmittance_cutoff must be a share of the light from 0"),
+        ({"transmittance_cutoff": 1}, "transmittance_cutoff must be .* from 0 to below 1; got 1"),
     ],
     TransferFunction: [
         ({"opacities": [0.5]}, "as many opacities as colors; got 1 and 2"),
