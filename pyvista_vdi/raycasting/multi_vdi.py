@@ -21,7 +21,7 @@ from pyvista_vdi.device import DeviceBuffer, Launch, Runtime, get_runtime, padde
 from pyvista_vdi.device.constants import CELL, CELL_ITEMS, GROUP, SEGMENT_SIZE, SPARE_SLOTS
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
+from pyvista_vdi.model.options import FrameRequest, RenderOptions
 from pyvista_vdi.model.ray_forms import Rectangle, pixels_of_points
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose, choose_merge
@@ -208,7 +208,7 @@ def owned_image(
         for one in placed:
             # All end at the same transmittance
             options = one.options.replace(
-                transmittance_cutoff=TRANSMITTANCE_CUTOFF, preview_samples=None
+                transmittance_cutoff=RenderOptions.transmittance_cutoff, preview_samples=None
             )
             own = request.replace(camera=one.camera, options=options)
             scenes.append(Scene.of(prepared_vdi(runtime, one.vdi), own, keep, segments=True))
@@ -338,7 +338,7 @@ class _MergedCells:
             merge.switches,
             width=scenes[0].size[0],
             height=scenes[0].size[1],
-            transmittance_cutoff=TRANSMITTANCE_CUTOFF,
+            transmittance_cutoff=RenderOptions.transmittance_cutoff,
         )
 
     def draw(
