@@ -4,12 +4,7 @@ from __future__ import annotations
 
 import sys
 
-
-def _run() -> int:
-    from pyvista_vdi.cli import main
-
-    return main()
-
+from pyvista_vdi.cli import main
 
 if __name__ == "__main__":
-    sys.exit(_run())
+    sys.exit(main())

@@ -115,8 +115,6 @@ azimuth=0           DEGREES   turn by
 elevation=0         DEGREES   lift by
 transfer_function   FILE      TransferFunction.to_dict() as JSON; needs no PyVista
 memory_limit        N         bytes of the device; what does not fit goes there in bricks
-criterion           NAME      where a list is cut: least-error (default) or homogeneity
-max_bytes           N         most bytes of the VDI on the device
 compression         {lz4,zstd,deflate,none}  of .vdi, by default lz4; .html has deflate
 compression_level   N         1 (fast) to 9 (small)
 time                T         of a series, the step nearest in time (default: the first)

@@ -45,9 +45,8 @@ look:
 
 COMPARE = """
 VOLUME out size=1280x720 angles=0,5,30 no_vtk
-repeats=3        COUNT           timed frames of each kind
-precision=exact  {exact,8-byte}  of the supersegments
-compression=lz4 max_supersegments sample_distance device
+repeats=3  COUNT  timed frames of each kind
+compression=lz4 precision max_supersegments sample_distance device
 look:
 """
 

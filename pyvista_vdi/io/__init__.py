@@ -10,14 +10,9 @@ from pyvista_vdi.io.files import (
     write,
 )
 from pyvista_vdi.io.png import to_bytes, write_png
-from pyvista_vdi.io.vdi_file.layout import FORMAT_VERSION, SUFFIX
-from pyvista_vdi.io.vdi_file.reader import FileInfo
 from pyvista_vdi.model.whole_file import check_writable, whole_file
 
 __all__ = [
-    "FORMAT_VERSION",
-    "SUFFIX",
-    "FileInfo",
     "check_writable",
     "check_write_options",
     "checked_target",

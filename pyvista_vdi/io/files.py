@@ -11,7 +11,7 @@ from pyvista_vdi import registry
 from pyvista_vdi.errors import InvalidArgumentError, InvalidVDIError
 from pyvista_vdi.io.progress import Progress
 from pyvista_vdi.io.vdi_file.chunks import check_level
-from pyvista_vdi.io.vdi_file.reader import FileInfo
+from pyvista_vdi.io.vdi_file.reader import FileInfo, opened_file
 from pyvista_vdi.model.checks import one_of
 from pyvista_vdi.model.packing import PRECISIONS
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
@@ -50,7 +50,7 @@ def opened(path: str | os.PathLike[str]) -> BinaryIO:
     if found is not None and found.page:
         stream: BinaryIO = found.load().data_in(path)
         return stream
-    return Path(path).open("rb")
+    return opened_file(path)
 
 
 def write(

@@ -246,30 +246,27 @@ def _vtk_times(bench: Bench, plan: Mapping[str, Any]) -> dict[str, float]:
 
 def _point(bench: Bench, setting: Setting, plan: Mapping[str, Any]) -> Point:
     """Return the figures of a setting."""
-    options = {"sample_distance": 0.5, "precision": "exact", "lists": 1.0, **setting}
+    options = {"sample_distance": 0.5, "lists": 1.0, **setting}
     options["sample_distance"] *= bench.voxel
-    precision, share = options.pop("precision"), options.pop("lists")
+    share = options.pop("lists")
     width, height = (max(1, round(edge * share)) for edge in bench.size)
-    made: list[Any] = []
-
-    def generate() -> None:
-        made[:] = [bench.generate((width, height), **options).with_precision(precision)]
-
+    generate = partial(bench.generate, (width, height), **options)
+    vdi = generate()
     work: dict[str, Step] = {"volume": partial(bench.raycast, bench.view), "vdi": generate}
     generation = take_turns(work, plan["generations"])
     with tempfile.TemporaryDirectory() as folder:
-        size = made[0].save(Path(folder) / "vdi.vdi").stat().st_size
+        size = vdi.save(Path(folder) / "vdi.vdi").stat().st_size
     frames, ssims = {}, {}
     for angle in plan["angles"]:
         camera = bench.view.azimuth(angle)
-        draw = partial(bench.draw, made[0], camera)
+        draw = partial(bench.draw, vdi, camera)
         ssims[angle] = compare_images(draw(), bench.reference(camera)).ssim
         volume = partial(bench.raycast, camera, bench.voxel)
         taken = take_turns({"volume": volume, "vdi": draw}, plan["repeats"])
         frames[angle] = ratio(taken["vdi"], taken["volume"])
     costs = {
         "frame": statistics.geometric_mean(frames.values()),
-        "memory": prepared_vdi(bench.runtime, made[0]).list_bytes / 2**20,
+        "memory": prepared_vdi(bench.runtime, vdi).list_bytes / 2**20,
         "file": size / 2**20,
         "generation": ratio(generation["vdi"], generation["volume"]),
     }

@@ -39,8 +39,8 @@ from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI, DeferredVDI, picture_view
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper, first_camera
 from pyvista_vdi.plotting.classify import Looks, stored_table
-from pyvista_vdi.plotting.progress import progress_callback
-from pyvista_vdi.plotting.volumes import as_grid, held, load
+from pyvista_vdi.plotting.progress import DelayedBar
+from pyvista_vdi.plotting.volumes import as_grid, load
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
 from pyvista_vdi.quality.targets import refuse_settings
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
@@ -335,7 +335,10 @@ def _of_volume(volume: Any, asked: Addition, plotter: Any) -> _Shown:
 def _source(volume: Any, asked: Addition) -> VDISource:
     """Return a source of VDIs of a volume, made as it was asked for."""
     image, name = as_grid(volume, asked.array.scalars, asked.making.resolution)
-    data, preference = held(image), asked.array.preference
+    # As add_volume, keep geometry and arrays by name as they are now, and share the points' values
+    data, preference = pv.ImageData(), asked.array.preference
+    data.ShallowCopy(image)
+    data.GetCellData().DeepCopy(image.GetCellData())
     named = None if name is None else data.GetPointData().GetArray(name)
     if named is not None and preference == "point":
         # As add_volume: another may be made the active one of the mapper's dataset
@@ -347,7 +350,10 @@ def _source(volume: Any, asked: Addition) -> VDISource:
     source.SetOptions(asked.options)
     source.SetDial(**asked.target.given)
     source.SetDevice(asked.making.device)
-    source.SetProgressCallback(progress_callback(asked.making.progress_bar))
+    progress: Any = asked.making.progress_bar
+    if not callable(progress):
+        progress = None if progress is False else DelayedBar(always=bool(progress))
+    source.SetProgressCallback(progress)
     if asked.making.camera is not None:
         source.SetCamera(asked.making.camera)
     return source

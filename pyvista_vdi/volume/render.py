@@ -118,7 +118,7 @@ def raycast_medium(
         items = block_items(width, rows)
         states = keep(runtime.buffer((items, 2, 4), name="states of rays"))
         room = items * _PART_STEPS
-        sampler = keep(StepSampler(runtime, bricks, medium_arguments, variant, forms, room, ends))
+        sampler = StepSampler(runtime, bricks, medium_arguments, variant, forms, room, keep, ends)
         launch = draw(samples=sampler.samples, states=states)
         for first_row in range(0, height, rows):
             now = min(rows, height - first_row)

@@ -96,12 +96,8 @@ class Archive(Called):
 
     def _opened(self) -> zipfile.ZipFile:
         """Return the file as an archive, or say what it is instead of one."""
-        try:
-            stream = opened(self.path)
-            weakref.finalize(self, stream.close)
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise VDIFileError(f"{self.path} cannot be read: {reason}") from error
+        stream = opened(self.path)
+        weakref.finalize(self, stream.close)
         try:
             archive = zipfile.ZipFile(stream)
         except reader.ARCHIVE_ERRORS as error:

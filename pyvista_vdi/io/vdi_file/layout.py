@@ -39,9 +39,6 @@ FORMAT_NAME = "pyvista-vdi"
 #: ``deferred``, with a version of its own.
 DEFERRED_NAME = "pyvista-vdi-deferred"
 
-#: The name that a file's name ends in.
-SUFFIX = ".vdi"
-
 #: The archive's first member.
 DESCRIPTION = "vdi.json"
 

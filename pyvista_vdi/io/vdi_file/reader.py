@@ -131,17 +131,21 @@ def read_info(path: str | os.PathLike[str], *, stream: BinaryIO | None = None) -
         return file.info
 
 
+def opened_file(path: str | os.PathLike[str]) -> BinaryIO:
+    """Open a file to be read; VDIFileError says why it cannot be."""
+    try:
+        return Path(path).open("rb")
+    except (OSError, ValueError, TypeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise VDIFileError(f"{path!s} cannot be read: {reason}") from error
+
+
 class _OpenFile(AbstractContextManager["_OpenFile"]):
     """A .vdi file whose description has been read and checked."""
 
     def __init__(self, path: str | os.PathLike[str], stream: BinaryIO | None = None) -> None:
-        try:
-            self._path = Path(path)
-            self._stream = self._path.open("rb") if stream is None else stream
-        except (OSError, ValueError, TypeError) as error:
-            raise VDIFileError(
-                f"{path!s} cannot be read: {getattr(error, 'strerror', None) or error}"
-            ) from error
+        self._stream = opened_file(path) if stream is None else stream
+        self._path = Path(path)
         try:
             self._archive = self._opened_archive()
             self._description = self._read_description()

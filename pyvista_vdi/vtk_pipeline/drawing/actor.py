@@ -27,8 +27,8 @@ refuse(VDIShaderProperty, OF_SHADERS)
 class VDIActorMethods:
     """What makes a volume show a VDI; mixed into VTK's and into PyVista's."""
 
-    def _become_vdi_actor(self: Any) -> None:
-        """Install a shader of its own."""
+    def __init__(self: Any) -> None:
+        super().__init__()
         super().SetShaderProperty(shader := VDIShaderProperty())  # type: ignore[misc]
         vtkOpenGLShaderProperty.SetFragmentShaderCode(shader, LOOKUP)
         place_image(self, 0, (0, 0), (1, 1))
@@ -253,6 +253,3 @@ class VDIActor(VDIActorMethods, vtkVolume):
     volume property is that of the source. Other coordinate systems than the world, and another
     shader, are refused by name.
     """
-
-    def __init__(self) -> None:
-        self._become_vdi_actor()

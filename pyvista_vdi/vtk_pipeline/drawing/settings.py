@@ -30,6 +30,7 @@ class MapperSettings:
     image_distance: float = 1.0
     adjust: bool = True
     off_screen: bool = False
+    device: Any = None
 
 
 _DECLARED = RenderOptions.declared | DrawingOptions.declared
@@ -63,6 +64,7 @@ SETTINGS: Mapping[str, Option] = {
         "whether off-screen windows are treated as if somebody watched them",
         check=partial(as_flag, name="InteractiveOffScreen"),
     ),
+    "Device": Option("device", None, "the OpenCL device; ``None`` is the default one"),
 }
 
 
