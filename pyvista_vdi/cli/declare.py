@@ -16,14 +16,7 @@ from typing import Any
 from pyvista_vdi.model.camera import check_window_size
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import (
-    Deferral,
-    DrawingOptions,
-    GenerationOptions,
-    QualityTarget,
-    RenderOptions,
-    declared,
-)
+from pyvista_vdi.model.options import RECORDS, declared
 
 
 def _numbers_as(
@@ -96,7 +89,6 @@ _CALLED = {
     "ArrayLike": "A,B,...",
     "OpacityLike": "NAME|A,B,...",
 }
-_RECORDS = (RenderOptions, DrawingOptions, Classification, Deferral)
 
 _OPTIONS = """
 output              FILE      .vdi, .exr or .html to write
@@ -230,7 +222,8 @@ def _add_option(into: Any, name: str, value: str, text: str) -> None:
 def _known() -> dict[str, tuple[str, str, str]]:
     """Return the options that are known by their names: name and default, value, and text."""
     found = {}
-    for name, told in declared(*_RECORDS, GenerationOptions, QualityTarget).items():
+    records: tuple[Any, ...] = (Classification, *RECORDS)
+    for name, told in declared(*records).items():
         value = _CALLED.get(told.kind.removesuffix(" | None"), "NAME")
         value = "DEGREES" if "degrees" in told.what else value
         value = "{" + ",".join(told.choices) + "}" if told.choices else value
