@@ -10,8 +10,8 @@ from pyvista_vdi.model.collection import (VDICollection)
 from pyvista_vdi.model.transfer_function import (TransferFunction)
 from pyvista_vdi.model.types import (
     CameraLike, ClientLike, ColorMapLike, Coverage, Criterion, CroppingLike, DeviceLike,
-    Interpolation, LightsLike, OcclusionLike, OpacityLike, Precision, Preference, Progress, Quality,
-    RangeLike, ScalarsLike, ShownLike, VTKObject, VolumeLike, WindowSize,
+    Interpolation, LightsLike, OcclusionLike, OpacityLike, PlanesLike, Precision, Preference,
+    Progress, PropertyLike, Quality, RangeLike, ScalarsLike, ShownLike, VolumeLike, WindowSize,
 )
 from pyvista_vdi.model.vdi import (DeferredVDI, VDI)
 from pyvista_vdi.raycasting.picking import (Pick)
@@ -25,8 +25,8 @@ def generate(
     None, flip_scalars: bool = False, opacity_unit_distance: float | None = None, log_scale: bool =
     False, shade: bool = False, ambient: float | None = None, diffuse: float | None = 0.7, specular:
     float | None = 0.2, specular_power: float | None = 10.0, interpolation: Interpolation =
-    'nearest', volume_property: VTKObject | None = None, transfer_function: TransferFunction | None
-    = None, classification: Literal['baked'] = 'baked', value_range: RangeLike | None = None,
+    'nearest', volume_property: PropertyLike | None = None, transfer_function: TransferFunction |
+    None = None, classification: Literal['baked'] = 'baked', value_range: RangeLike | None = None,
     quality: Quality | None = None, target_ssim: float | None = None, full_fps: float | None = None,
     max_bytes: int | None = None, lights: LightsLike | None = None, ambient_occlusion: OcclusionLike
     | None = None, max_supersegments: int = 20, precision: Precision = 'exact', settings: Settings |
@@ -41,8 +41,8 @@ def generate(
     None, flip_scalars: bool = False, opacity_unit_distance: float | None = None, log_scale: bool =
     False, shade: bool = False, ambient: float | None = None, diffuse: float | None = 0.7, specular:
     float | None = 0.2, specular_power: float | None = 10.0, interpolation: Interpolation =
-    'nearest', volume_property: VTKObject | None = None, transfer_function: TransferFunction | None
-    = None, classification: Literal['deferred'], value_range: RangeLike | None = None, quality:
+    'nearest', volume_property: PropertyLike | None = None, transfer_function: TransferFunction |
+    None = None, classification: Literal['deferred'], value_range: RangeLike | None = None, quality:
     Quality | None = None, target_ssim: float | None = None, full_fps: float | None = None,
     max_bytes: int | None = None, lights: LightsLike | None = None, ambient_occlusion: OcclusionLike
     | None = None, max_supersegments: int = 20, precision: Precision = 'exact', settings: Settings |
@@ -51,21 +51,22 @@ def generate(
 ) -> DeferredVDI: ...
 def pick(
     vdi: ShownLike, camera: CameraLike, pixel: Sequence[float], window_size: WindowSize | None =
-    None, *, clipping_planes: ArrayLike | None = None, cropping: CroppingLike | None = None,
+    None, *, clipping_planes: PlanesLike | None = None, cropping: CroppingLike | None = None,
     opacity_multiplier: float = 1.0, opacity_threshold: float = 0.05, accumulated: bool = True,
     opaque_depth: float | None = None, **look: Any,
 ) -> Pick | None: ...
 def read(path: str | os.PathLike[str], **options: Any) -> VDI | DeferredVDI | VDICollection: ...
 def render(
     vdi: ShownLike | Sequence[ShownLike], camera: CameraLike, window_size: WindowSize | None = None,
-    *, clipping_planes: ArrayLike | Sequence[ArrayLike | None] | None = None, cropping: CroppingLike
-    | None = None, opacity_multiplier: float | Sequence[float] = 1.0, preview_samples: int | None =
-    None, settings: Settings | None = None, opaque_depth: ArrayLike | None = None, model_transforms:
-    Sequence[ArrayLike] | None = None, device: DeviceLike | None = None, **look: Any,
+    *, preview_samples: int | None = None, settings: Settings | None = None, clipping_planes:
+    ArrayLike | Sequence[ArrayLike | None] | None = None, cropping: CroppingLike | None = None,
+    opacity_multiplier: float | Sequence[float] = 1.0, opaque_depth: ArrayLike | None = None,
+    model_transforms: Sequence[ArrayLike] | None = None, device: DeviceLike | None = None, **look:
+    Any,
 ) -> NDArray[np.float32]: ...
 def render_depth(
     vdi: ShownLike, camera: CameraLike, window_size: WindowSize | None = None, *, clipping_planes:
-    ArrayLike | None = None, cropping: CroppingLike | None = None, opacity_multiplier: float = 1.0,
+    PlanesLike | None = None, cropping: CroppingLike | None = None, opacity_multiplier: float = 1.0,
     opacity_threshold: float = 0.05, accumulated: bool = True, opaque_depth: ArrayLike | None =
     None, device: DeviceLike | None = None, **look: Any,
 ) -> NDArray[np.float32]: ...
@@ -76,9 +77,9 @@ def render_volume(
     None, flip_scalars: bool = False, opacity_unit_distance: float | None = None, log_scale: bool =
     False, shade: bool = False, ambient: float | None = None, diffuse: float | None = 0.7, specular:
     float | None = 0.2, specular_power: float | None = 10.0, interpolation: Interpolation =
-    'nearest', volume_property: VTKObject | None = None, transfer_function: TransferFunction | None
-    = None, lights: LightsLike | None = None, ambient_occlusion: OcclusionLike | None = None,
-    clipping_planes: ArrayLike | None = None, cropping: CroppingLike | None = None,
+    'nearest', volume_property: PropertyLike | None = None, transfer_function: TransferFunction |
+    None = None, lights: LightsLike | None = None, ambient_occlusion: OcclusionLike | None = None,
+    clipping_planes: PlanesLike | None = None, cropping: CroppingLike | None = None,
     opacity_multiplier: float = 1.0, settings: Settings | None = None, opaque_depth: ArrayLike |
     None = None, early_termination: bool = True, device: DeviceLike | None = None,
 ) -> NDArray[np.float32]: ...

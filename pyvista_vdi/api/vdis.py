@@ -20,7 +20,6 @@ from pyvista_vdi.model.options import (
     GenerationOptions,
     GenerationRequest,
     QualityTarget,
-    declared,
 )
 from pyvista_vdi.model.types import (
     CameraLike,
@@ -40,7 +39,7 @@ from pyvista_vdi.raycasting.classified_values import classify_on_device
     deferral=Deferral,
     target=QualityTarget,
     options=GenerationOptions,
-    returns={"classification": {"baked": "VDI", "deferred": "DeferredVDI"}},
+    request=GenerationRequest,
 )
 def generate(
     volume: VolumeLike,
@@ -59,42 +58,16 @@ def generate(
 
     Parameters
     ----------
-    volume : pyvista.ImageData or vtkImageData or Volume
-        Scalars on a uniform grid; spacing, origin and direction matrix are honoured, cell data
-        are converted as ``Plotter.add_volume`` does.
-    camera : pyvista.Camera or vtkCamera or Camera, or (position, focal point, view up)
-        The generating view V_O.
-    window_size : (int, int)
-        Width and height in pixels: lists along each edge of the viewport.
     client : distributed.Client or str, optional
         Of a Dask cluster, or the address of its scheduler. Its workers make the VDI of a chunked
         volume (a :class:`Volume` of a Dask, zarr or h5py array, or of :func:`read_volume`), whose
         files all of them must find. Without it such a volume is made block by block on the local
         device. See docs/large_volumes.md.
-    device : str, int or device, optional
-        Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
-    progress : callable, optional
-        Called with the finished fraction, 0 to 1; work stops if it returns ``False``.
 
     Returns
     -------
     VDI or DeferredVDI
         The supersegments of every list, with the view and what made them.
-
-    Raises
-    ------
-    TypeError
-        If a keyword is unknown.
-    InvalidVolumeError, InvalidCameraError, InvalidArgumentError
-        If an argument cannot be used.
-    UnsupportedError
-        If another blending mode is asked for, or what else a VDI cannot honour.
-    MissingDependencyError
-        If a colour map or an opacity is named and PyVista is not installed.
-    NoDeviceError, DeviceMemoryError, DeviceError, KernelBuildError
-        If there is no device, or it fails.
-    Cancelled
-        If ``progress`` returned ``False``.
 
     Warns
     -----
@@ -110,12 +83,12 @@ def generate(
     >>> vdi = pvdi.generate(volume, camera, (640, 360), cmap="bone")  # doctest: +SKIP
     """
     read = as_volume(volume, look.scalars, look.preference)
-    if deferral.deferred:
+    keeps = deferral.deferred
+    if keeps:
         look.require_no_look()
-        deferral.refuse_target(target)
+        target.refuse_deferred()
     from pyvista_vdi.generation.deferred import generate_deferred, unclassified
 
-    keeps = deferral.deferred
     table = unclassified(look.interpolation) if keeps else look.transfer_function_of(read)
     view: Any = camera
     size: Any = window_size  # which the request checks, as the view
@@ -123,11 +96,8 @@ def generate(
     request = GenerationRequest(read, table, view, size, options, device, progress, about)
     from pyvista_vdi.quality.targets import generate_anywhere, warn_missed
 
-    vdi: Any
-    if keeps:
-        vdi = generate_deferred(request, deferral, lambda it: generate_anywhere(it, target, client))
-    else:
-        vdi = generate_anywhere(request, target, client)
+    make = partial(generate_anywhere, target=target, client=client)
+    vdi: Any = generate_deferred(request, deferral, make) if keeps else make(request)
     warn_missed(vdi)
     if not vdi.n_supersegments and nearest_depth(read, request.camera, request.window_size) is None:
         warn_external(f"the VDI is empty: the camera sees nothing of the bounds {read.bounds}")
@@ -182,7 +152,7 @@ def classified(stored: DeferredVDI | VDICollection, look: Mapping[str, Any]) -> 
             "these VDIs have colours already: a look is for those that keep values, which "
             "classification='deferred' makes"
         )
-    refuse_unknown(look, "classified", (*declared(Classification), "device"))
+    refuse_unknown(look, "classified", (*Classification.declared, "device"))
     asked = Classification(**{name: value for name, value in look.items() if name != "device"})
     if said := asked.given.keys() & {"scalars", "preference", "interpolation"}:
         raise InvalidArgumentError(

@@ -16,7 +16,13 @@ from typing import Any
 from pyvista_vdi.model.camera import check_window_size
 from pyvista_vdi.model.checks import as_float
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import RECORDS, declared
+from pyvista_vdi.model.options import (
+    Deferral,
+    DrawingOptions,
+    GenerationOptions,
+    QualityTarget,
+    RenderOptions,
+)
 
 
 def _numbers_as(
@@ -86,9 +92,9 @@ _CALLED = {
     "int": "N",
     "float": "X",
     "RangeLike": "LOW HIGH",
-    "ArrayLike": "A,B,...",
     "OpacityLike": "NAME|A,B,...",
 }
+_RECORDS = (RenderOptions, DrawingOptions, Classification, Deferral, GenerationOptions)
 
 _OPTIONS = """
 output              FILE      .vdi, .exr or .html to write
@@ -222,8 +228,7 @@ def _add_option(into: Any, name: str, value: str, text: str) -> None:
 def _known() -> dict[str, tuple[str, str, str]]:
     """Return the options that are known by their names: name and default, value, and text."""
     found = {}
-    records: tuple[Any, ...] = (Classification, *RECORDS)
-    for name, told in declared(*records).items():
+    for told in [told for each in (*_RECORDS, QualityTarget) for told in each.declared.values()]:
         value = _CALLED.get(told.kind.removesuffix(" | None"), "NAME")
         value = "DEGREES" if "degrees" in told.what else value
         value = "{" + ",".join(told.choices) + "}" if told.choices else value
@@ -231,7 +236,7 @@ def _known() -> dict[str, tuple[str, str, str]]:
         plain = isinstance(usual, int | float) and not isinstance(usual, bool)
         text += f" (default: {usual:g})" if plain else ""
         text += f" (default: {usual})" if told.choices and usual else ""
-        found[name] = name, value, text
+        found[told.name] = told.name, value, text
     for line in _OPTIONS.strip().splitlines():
         name, value, text = re.split(" {2,}", line, maxsplit=2)
         found[name.partition("=")[0]] = name, value, text

@@ -19,7 +19,6 @@ from pyvista_vdi.model.arguments import Settings
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.classification import Classification, Look
 from pyvista_vdi.model.inputs import as_volume
-from pyvista_vdi.model.options import declared
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.volume import Volume
 
@@ -30,7 +29,7 @@ OF_VOLUMES = (
     *("scalars", "preference", "spacing", "origin", "level", "channel", "time_index", "series"),
 )
 #: Options that give colours and opacities.
-LOOK = ("transfer_function", *declared(Look))
+LOOK = ("transfer_function", *Look.declared)
 #: Options that say where the eye is, instead of turning the default view.
 PLACE = ("camera_json", "position", "focal_point", "view_up", "parallel_scale")
 
@@ -40,8 +39,8 @@ def given(options: argparse.Namespace, *records: Any, flat: bool = False) -> dic
 
     What is seldom turned is in ``settings``, or ``flat`` beside the others.
     """
-    values = {name: getattr(options, name, None) for name in declared(*records)}
-    found = {name: value for name, value in values.items() if value is not None}
+    named = {name for record in records for name in record.declared}
+    found = {n: value for n, value in vars(options).items() if n in named and value is not None}
     seldom = {name: found.pop(name) for name in Settings.declared if name in found and not flat}
     return found | ({"settings": Settings(**seldom)} if seldom else {})
 

@@ -13,7 +13,6 @@ from pyvista_vdi.model.options import (
     Deferral,
     GenerationOptions,
     GenerationRequest,
-    record,
 )
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import DeferredVDI, lengths_of, made_vdi
@@ -42,15 +41,9 @@ def unclassified(interpolation: str) -> TransferFunction:
     return TransferFunction([[0] * 3], [0], (0, 1), interpolation=interpolation)
 
 
-@record
 @dataclass(frozen=True)
 class _LengthOptions(GenerationOptions):
     """Options under which merging counts lengths alone, of a medium of :data:`_PER_VOXEL`."""
-
-    @property
-    def hidden_weight(self) -> float:
-        """1: what V_O sees makes no difference."""
-        return 1.0
 
     @property
     def finest_error(self) -> float:
@@ -75,7 +68,8 @@ def generate_deferred(
     made = generate(
         request.replace(
             transfer_function=_keeping(request, (low, high)),
-            options=_LengthOptions(**{**given, "precision": "exact"}),
+            # Served from everywhere: what V_O sees makes no difference
+            options=_LengthOptions(**{**given, "precision": "exact", "view_cone": 90.0}),
         )
     )
     if made is None:

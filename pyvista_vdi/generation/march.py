@@ -127,7 +127,8 @@ class Records:
             "window_row": self.window.y0,
             "finest": self.finest,
             "reference_length": voxel,
-            "hidden_weight": options.hidden_weight,
+            # Of what V_O cannot see at all when neighbours are merged
+            "hidden_weight": 1 - np.cos(np.radians(options.view_cone)),
         }
         self.recording = {**numbers, "limit": slices.kept}
         self._budget = {**numbers, "limit": options.max_supersegments}
@@ -214,25 +215,24 @@ class March:
         keep: Keep,
         entering: DeviceBuffer | None = None,
     ) -> None:
-        self._records, self._most_steps = records, medium.most_steps
+        self._records, self._most_steps, bricks = records, medium.most_steps, medium.bricks
         runtime, arguments = records.runtime, medium.medium_arguments(camera)
         # Opacity is summed up from 0 in every run
         compensated = 2 if medium.variant.compensated > 1 else 0
         variant = replace(
             medium.variant, double_float=records.march.double_float, compensated=compensated
         )
-        self._longest = self._longest_rays(arguments["classified"], medium.sample_distance)
+        self._longest = self._longest_rays(arguments["classified"], medium.rays.sample_distance)
         self._sampler = None
-        if medium.bricks is not None:
-            room = records.slices.items * CHUNK_STEPS
-            sampler = StepSampler(runtime, medium.bricks, arguments, variant, records.forms, room)
-            self._sampler = keep(sampler)
+        if bricks is not None:
+            forms, room = records.forms, records.slices.items * CHUNK_STEPS
+            self._sampler = StepSampler(runtime, bricks, arguments, variant, forms, room, keep)
         self._launch = RayLaunch(
             runtime,
             "generation/march_lists.cl",
             "march_lists",
             variant.defines,
-            one_by_one=variant.one_by_one or medium.bricks is not None,
+            one_by_one=variant.one_by_one or bricks is not None,
             **arguments,
             forms=records.forms,
             samples=self._sampler and self._sampler.samples,

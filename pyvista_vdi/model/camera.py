@@ -298,12 +298,9 @@ class Camera:
         float64 (3, 3) each. The ray through ``(u, v)`` is ``P(t) = [1, u, v] @ origin +
         t [1, u, v] @ direction``; its direction has Z = 1, so t is view depth.
         """
-        half_width, half_height = self.half_extent(window_size)
-        c_x, c_y = self.window_center
-        slope = np.array(
-            [[c_x * half_width, c_y * half_height, 0.0], [half_width, 0, 0], [0, half_height, 0]]
-        )
-        forward = np.zeros((3, 3))
+        half = self.half_extent(window_size)
+        slope, forward = np.zeros((3, 3)), np.zeros((3, 3))
+        slope[:, :2] = np.vstack([np.multiply(half, self.window_center), np.diag(half)])
         forward[0, 2] = 1.0
         if self.parallel_projection:
             return slope, forward

@@ -95,10 +95,11 @@ def suggestion(name: str, known: Sequence[str], cutoff: float = 0.6) -> str:
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
 
 
-def check_callback(function: Any) -> None:
-    """Raise InvalidArgumentTypeError if ``progress`` is neither a function nor ``None``."""
+def check_callback(function: Any) -> Any:
+    """Return ``progress``; InvalidArgumentTypeError if it is neither a function nor ``None``."""
     if function is not None and not callable(function):
         raise InvalidArgumentTypeError(f"progress must be a function; got {function!r}")
+    return function
 
 
 def as_range(values: Any) -> tuple[float, float]:

@@ -16,16 +16,16 @@ from pyvista_vdi.errors import (
     UnsupportedError,
 )
 from pyvista_vdi.model.checks import Number
-from pyvista_vdi.model.options import Options, option, record
+from pyvista_vdi.model.options import Options, option
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.types import (
     ColorMapLike,
     Interpolation,
     OpacityLike,
     Preference,
+    PropertyLike,
     RangeLike,
     ScalarsLike,
-    VTKObject,
 )
 from pyvista_vdi.model.volume import Volume
 
@@ -56,88 +56,77 @@ def _composite(mode: Any) -> str:
     )
 
 
-@record
 @dataclass(frozen=True, eq=False)
 class ArrayChoice(Options):
-    """``add_volume``'s arguments that say which scalars are seen, and how along a ray."""
+    """``add_volume``'s arguments that say which scalars are seen, and how along a ray.
 
-    scalars: ScalarsLike | None = option(
-        None,
-        "name of an array, or the values, per point or per cell",
-        "RGBA as uint8 (n, 4). By default the active ones.",
-    )
-    preference: Preference = option(
-        "point", "which array, where points and cells both have one of that name"
-    )
-    blending: str = option(
-        "composite",
-        "what becomes of the scalars along a ray",
-        'As in ``add_volume``; a VDI has ``"composite"`` alone.',
-        check=_composite,
-        takes="str | int",
-    )
+    scalars: name of an array, or the values, per point or per cell
+        RGBA as uint8 (n, 4). By default the active ones.
+    preference: which array, where points and cells both have one of that name
+    blending: what becomes of the scalars along a ray
+        As in ``add_volume``; a VDI has ``"composite"`` alone.
+    """
+
+    scalars: ScalarsLike | None = None
+    preference: Preference = "point"
+    blending: str = option("composite", _composite, "str | int")
 
 
-@record
 @dataclass(frozen=True, eq=False)
 class Look(Options):
     """``add_volume``'s arguments that say what a scalar looks like, with its names and defaults.
 
     ``interpolation``, which ``add_volume`` leaves at VTK's default, is one of them. What is not
     checked here is refused where a table is built of it.
+
+    clim: range of the colour map; that of all values by default
+    n_colors: entries of the colour map
+    opacity: name, one opacity, or opacities
+        As in ``add_volume``: an array of length ``n_colors`` is taken as it is, 0 to 255; a shorter
+        one is 0 to 1 and interpolated.
+    cmap: colour map; the theme's by default
+    flip_scalars: reverse the colour map
+    opacity_unit_distance: length over which opacities are reached, model units
+        By default the volume's diagonal over its mean number of cells.
+    log_scale: map values to colours by their logarithm
+    shade: light the volume
+        A shaded VDI has the lights as they stand at its generating view; other lights, and another
+        place among lights of the scene, regenerate it.
+    ambient: ambient light that is reflected, where shaded
+    diffuse: diffuse light that is reflected, where shaded
+    specular: specular light that is reflected, where shaded
+    specular_power: how narrow highlights are, where shaded
+    interpolation: between voxels; ``add_volume`` draws ``"nearest"``
     """
 
-    elsewhere = (
-        "this VDI's colours are fixed: give it to generate, or generate with "
-        "classification='deferred', which keeps values"
-    )
-
-    clim: RangeLike | None = option(None, "range of the colour map; that of all values by default")
-    n_colors: int = option(
-        256,
-        "entries of the colour map",
-        # Building more takes PyVista time by the square, some seconds here
-        check=Number(low=1, high=16384, whole=True),
-    )
-    opacity: OpacityLike = option(
-        "linear",
-        "name, one opacity, or opacities",
-        "As in ``add_volume``: an array of length ``n_colors`` is taken as it is, 0 to 255; a "
-        "shorter one is 0 to 1 and interpolated.",
-    )
-    cmap: ColorMapLike | None = option(None, "colour map; the theme's by default")
-    flip_scalars: bool = option(False, "reverse the colour map")
+    clim: RangeLike | None = None
+    # Building more colours takes PyVista time by the square, some seconds here
+    n_colors: int = option(256, Number(low=1, high=16384, whole=True))
+    opacity: OpacityLike = "linear"
+    cmap: ColorMapLike | None = None
+    flip_scalars: bool = False
     opacity_unit_distance: float | None = option(
-        None,
-        "length over which opacities are reached, model units; the volume's diagonal over its mean "
-        "number of cells by default",
-        check=Number("a length in model units", open_ended=True),
+        None, Number("a length in model units", open_ended=True)
     )
-    log_scale: bool = option(False, "map values to colours by their logarithm")
-    shade: bool = option(
-        False,
-        "light the volume",
-        "A shaded VDI has the lights as they stand at its generating view; other lights, and "
-        "another place among lights of the scene, regenerate it.",
-    )
-    ambient: float | None = option(None, "ambient light that is reflected, where shaded")
-    diffuse: float | None = option(0.7, "diffuse light that is reflected, where shaded")
-    specular: float | None = option(0.2, "specular light that is reflected, where shaded")
-    specular_power: float | None = option(10.0, "how narrow highlights are, where shaded")
-    interpolation: Interpolation = option(
-        "nearest", 'between voxels; ``add_volume`` draws ``"nearest"``'
-    )
+    log_scale: bool = False
+    shade: bool = False
+    ambient: float | None = None
+    diffuse: float | None = 0.7
+    specular: float | None = 0.2
+    specular_power: float | None = 10.0
+    interpolation: Interpolation = "nearest"
 
 
-@record
 @dataclass(frozen=True, eq=False)
 class Classification(Look, ArrayChoice):
-    """The classification arguments of one call, checked."""
+    """The classification arguments of one call, checked.
 
-    volume_property: VTKObject | None = option(None, "in place of the others, as it is")
-    transfer_function: TransferFunction | None = option(
-        None, "in place of the others; it needs no PyVista"
-    )
+    volume_property: in place of the others, as it is
+    transfer_function: in place of the others; it needs no PyVista
+    """
+
+    volume_property: PropertyLike | None = None
+    transfer_function: TransferFunction | None = None
 
     def __post_init__(self) -> None:
         in_place = [name for name in IN_PLACE if getattr(self, name) is not None]

@@ -21,7 +21,8 @@ PRESETS = {
     "inverted_cross": 0x7BE8BEF,
 }
 
-_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+#: Normals of planes across the axes of a frame.
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Cropping:
 
     planes: tuple[float, float, float, float, float, float]
     regions: int = PRESETS["subvolume"]
-    normals: tuple[tuple[float, float, float], ...] = _AXES
+    normals: tuple[tuple[float, float, float], ...] = AXES
 
     def __post_init__(self) -> None:
         planes, normals = as_floats(self.planes), as_floats(self.normals)
@@ -96,7 +97,7 @@ class Cropping:
             if not cropping.GetCropping():
                 return None
             planes, image = cropping.GetCroppingRegionPlanes(), cropping.GetDataSetInput()
-            normals: Any = _AXES
+            normals: Any = AXES
             matrix = image.GetDirectionMatrix() if hasattr(image, "GetDirectionMatrix") else None
             if matrix is not None and not matrix.IsIdentity():
                 # VTK's GPU mapper puts the planes' places into the image's bounds, takes each as a

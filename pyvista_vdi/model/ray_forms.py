@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidArgumentError, InvalidCameraError
 from pyvista_vdi.model.camera import Camera, unit
 from pyvista_vdi.model.checks import as_floats
-from pyvista_vdi.model.cropping import Cropping
+from pyvista_vdi.model.cropping import AXES, Cropping
 from pyvista_vdi.model.host_memory import aligned_empty
 from pyvista_vdi.model.view import bounds_corners, projected
 
@@ -140,9 +140,7 @@ def inverse_affine(matrix: Floats) -> Floats:
     return inverse
 
 
-def box_planes(
-    rays: PixelRays, bounds: ArrayLike, normals: ArrayLike = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
-) -> Floats:
+def box_planes(rays: PixelRays, bounds: ArrayLike, normals: ArrayLike = AXES) -> Floats:
     """Return the six forms that keep what is inside bounds along normals of the model frame."""
     low, high = np.reshape(bounds, (3, 2)).T
     rows = np.column_stack([normals, -low]), np.column_stack([np.negative(normals), high])
@@ -234,10 +232,10 @@ def largest_value(
     places = projected(camera, window_size, bounds_corners(bounds))
     places = np.array([(0, 0), window_size]) if places is None else np.clip(places, 0, window_size)
     ends = np.array([places.min(axis=0), places.max(axis=0)]) - np.divide(window_size, 2)
-    pixels = np.array([[1, a, b] for a in ends[:, 0] for b in ends[:, 1]])
+    pixels = np.reshape(np.meshgrid(1.0, *ends.T), (3, 4)).T
     values, slopes = pixels @ forms[:, :3].T, pixels @ forms[:, 3:].T
     far = rays.depths[1] - rays.reference_depth
-    return float(max(np.abs(part).max() for part in (forms[:, 0], values, values + far * slopes)))
+    return float(np.abs(np.vstack([forms[:, 0], values, values + far * slopes])).max())
 
 
 def pixels_of_points(camera: Camera, window_size: Sequence[int], points: Floats) -> Rectangle:

@@ -1,4 +1,4 @@
-"""What the public functions take, by name: the types of their arguments.
+"""What the public functions take, by name: the types of their arguments, and documentation's words.
 
 VTK's and PyVista's objects are told by the methods that they have, so that this module needs
 neither.
@@ -6,7 +6,7 @@ neither.
 
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Annotated, Any, Literal, Protocol, TypeAlias
 
 from numpy.typing import ArrayLike, NDArray
 
@@ -27,35 +27,48 @@ class VTKObject(Protocol):
         """Return the name of its class."""
 
 
-#: Width and height, pixels.
-WindowSize: TypeAlias = Sequence[int]
-#: Called with the finished fraction, 0 to 1; work stops if it returns ``False``.
-Progress: TypeAlias = Callable[[float], object]
+WindowSize: TypeAlias = Annotated[Sequence[int], "(int, int)"]
+Progress: TypeAlias = Annotated[Callable[[float], object], "callable"]
 
 #: A path is a file that ``read_volume`` reads.
-VolumeLike: TypeAlias = Volume | VTKObject | str | os.PathLike[str]
-CameraLike: TypeAlias = Camera | VTKObject | Sequence[ArrayLike]
+VolumeLike: TypeAlias = Annotated[
+    Volume | VTKObject | str | os.PathLike[str], "pyvista.ImageData or vtkImageData or Volume"
+]
+CameraLike: TypeAlias = Annotated[
+    Camera | VTKObject | Sequence[ArrayLike],
+    "pyvista.Camera or vtkCamera or Camera, or (position, focal point, view up)",
+]
 #: What is shown for one VDI: of a set that which is nearest to the view.
 ShownLike: TypeAlias = VDI | VTKObject | VDICollection | DeferredVDI
 #: What a plotter shows: a volume, or what is made of one already.
 AnyVolume: TypeAlias = VolumeLike | NDArray[Any] | ShownLike
-LightsLike: TypeAlias = Lights | VTKObject | Sequence[Light | VTKObject]
-CroppingLike: TypeAlias = Cropping | VTKObject | Sequence[float] | Sequence[object]
-OcclusionLike: TypeAlias = bool | float | AmbientOcclusion
+LightsLike: TypeAlias = Annotated[
+    Lights | VTKObject | Sequence[Light | VTKObject],
+    "renderer, or sequence of Light, vtkLight or pyvista.Light",
+]
+CroppingLike: TypeAlias = Annotated[
+    Cropping | VTKObject | Sequence[float] | Sequence[object],
+    "Cropping or vtkVolumeMapper or sequence of six numbers or pair",
+]
+OcclusionLike: TypeAlias = Annotated[
+    bool | float | AmbientOcclusion, "bool, float or AmbientOcclusion"
+]
+PlanesLike: TypeAlias = Annotated[ArrayLike, "array_like of float, shape (k, 6)"]
+DepthLike: TypeAlias = Annotated[ArrayLike, "array_like of float32, shape (H, W)"]
 #: A name or an index of the list of devices, or a device in use.
-DeviceLike: TypeAlias = str | int | Any
+DeviceLike: TypeAlias = Annotated[str | int | Any, "str, int or device"]
 #: A client of a Dask cluster, or the address of its scheduler.
 ClientLike: TypeAlias = str | Any
 
-#: A name of an array, or the values.
-ScalarsLike: TypeAlias = ArrayLike
-#: A name, one colour, a list of colours, a colour map or a lookup table.
-ColorMapLike: TypeAlias = str | Sequence[str] | VTKObject | Any
-#: A name, one opacity, or opacities.
-OpacityLike: TypeAlias = ArrayLike
+ScalarsLike: TypeAlias = Annotated[ArrayLike, "str or numpy.ndarray"]
+ColorMapLike: TypeAlias = Annotated[
+    str | Sequence[str] | VTKObject | Any, "str, list, matplotlib colour map or pyvista.LookupTable"
+]
+OpacityLike: TypeAlias = Annotated[ArrayLike, "str or float or array_like"]
 #: The range of a colour map, or its end, which is symmetric then.
-RangeLike: TypeAlias = ArrayLike
-MatrixLike: TypeAlias = ArrayLike | VTKObject
+RangeLike: TypeAlias = Annotated[ArrayLike, "float or (float, float)"]
+MatrixLike: TypeAlias = Annotated[ArrayLike | VTKObject, "array_like, shape (4, 4)"]
+PropertyLike: TypeAlias = Annotated[VTKObject, "vtkVolumeProperty"]
 
 Criterion: TypeAlias = Literal["least-error", "homogeneity"]
 Quality: TypeAlias = Literal["reference", "high", "balanced", "fast"]

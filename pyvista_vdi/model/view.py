@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
+from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.volume import Grid
 
@@ -16,10 +16,6 @@ MAX_LISTS_PER_PIXEL = 4.0
 
 #: A corner this little beyond a pixel's border, in pixels, does not need another row of lists.
 SLACK = 1e-6
-
-#: Rays along an edge of the window that tell what is seen, and by how much of V_O's window a point
-#: may lie outside of it by rounding.
-_RAYS, _COVERAGE_SLACK = 33, 1e-5
 
 
 @dataclass(frozen=True)
@@ -60,7 +56,7 @@ def covering_view(
     width w in a window of width W has t' = t w / W and c' t' = t (c + (x0 + x1) / W - 1); the same
     in y, and with s for t in parallel projection (docs/dev/conventions.md#list-coordinates).
     """
-    size = np.asarray(check_window_size(window_size), dtype=np.float64)
+    size = np.asarray(window_size, dtype=np.float64)
     pixels = projected(camera, window_size, np.asarray(corners, dtype=np.float64))
     if pixels is None:
         return None
@@ -101,7 +97,7 @@ def coverage(vdi: VDI, camera: Camera, window_size: Sequence[int]) -> float:
     if _has(vdi, corners).all():  # as with coverage="bounds"
         return 1.0
     u, v, _, w = in_viewport(camera, window_size, corners)
-    across = np.linspace(-1.0, 1.0, _RAYS)
+    across = np.linspace(-1.0, 1.0, 33)
     places = np.reshape(np.meshgrid(across, across), (2, -1))
     places = np.hstack([places, np.stack([u, v])[:, w > 0] / w[w > 0]])
     places = places[:, (np.abs(places) <= 1).all(axis=0)]
@@ -161,9 +157,9 @@ def required_level(levels: Sequence[Grid], camera: Camera, window_size: Sequence
 
 
 def _has(vdi: VDI, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which model points, (n, 3), lie in V_O's window."""
+    """Return which model points, (n, 3), lie in V_O's window, or outside by no more than 1e-5."""
     u, v, _, w = in_viewport(vdi.camera, vdi.window_size, points)
-    return np.asarray(np.maximum(np.abs(u), np.abs(v)) <= w + _COVERAGE_SLACK * np.abs(w).max())
+    return np.asarray(np.maximum(np.abs(u), np.abs(v)) <= w + 1e-5 * np.abs(w).max())
 
 
 #: Which of the six numbers of bounds are x, y and z of each corner, int (3, 8).

@@ -24,10 +24,6 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
         The plotter's.
     """
 
-    def __init__(self, theme: Any = None) -> None:
-        super().__init__(theme=theme)
-        self._become_vdi_mapper()
-
     @property
     def dataset(self) -> Any:
         """The volume that the VDI is made of; without one, a box of the VDI's bounds."""
@@ -48,10 +44,6 @@ class PlotterVDIMapper(VDIMapperMethods, OpenGLGPUVolumeRayCastMapper):
 
 class PlotterVDIActor(VDIActorMethods, Volume):
     """What ``Plotter.add_vdi`` returns: a ``pyvista.Volume`` with :attr:`vdi`."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._become_vdi_actor()
 
     def __repr__(self) -> str:
         """Return what is shown, and what of it the last frame drew."""

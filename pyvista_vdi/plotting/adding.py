@@ -34,14 +34,13 @@ from pyvista_vdi.model.options import (
     Options,
     QualityTarget,
     option,
-    record,
 )
 from pyvista_vdi.model.types import CameraLike, DeviceLike, MatrixLike
 from pyvista_vdi.model.vdi import VDI, DeferredVDI, picture_view
 from pyvista_vdi.plotting.actor import PlotterVDIActor, PlotterVDIMapper, first_camera
 from pyvista_vdi.plotting.classify import Looks, stored_table
-from pyvista_vdi.plotting.progress import progress_callback
-from pyvista_vdi.plotting.volumes import as_grid, held, load
+from pyvista_vdi.plotting.progress import DelayedBar
+from pyvista_vdi.plotting.volumes import as_grid, load
 from pyvista_vdi.quality.plan import REGENERATE_BELOW
 from pyvista_vdi.quality.targets import refuse_settings
 from pyvista_vdi.vtk_pipeline.filters.convert import is_vdi_image, vdi_from_image
@@ -70,54 +69,51 @@ def _note_mapper(name: Any) -> None:
         warn_external(f"mapper={name!r} chooses among VTK's volume mappers and is ignored")
 
 
-@record
 @dataclass(frozen=True, eq=False)
 class Placement(Options):
-    """Where an actor is put in a plotter, and what is shown beside it."""
+    """Where an actor is put in a plotter, and what is shown beside it.
 
-    reset_camera: bool | None = option(None, "whether the view is reset, as in ``add_volume``")
-    name: str | None = option(None, "of the actor; another of this name is replaced")
-    culling: bool | str = option(False, "of faces, which a volume has none of")
-    multi_colors: bool = option(
-        False, "give each block of a ``MultiBlock`` a colour map of its own"
-    )
-    mapper: str | None = option(
-        None,
-        "of VTK's volume mappers; a VDI has its own, and none means a thing",
-        check=_note_mapper,
-    )
-    scalar_bar_args: Mapping[str, Any] | None = option(
-        None,
-        "of the scalar bar, as in ``add_volume``",
-        takes="dict[str, Any] | None",
-    )
-    show_scalar_bar: bool | None = option(None, "whether there is a scalar bar; as the theme says")
-    pickable: Any = option(True, "whether it can be picked", takes="bool")
-    render: bool | None = option(True, "whether the plotter renders at once")
-    user_matrix: MatrixLike | None = option(None, "places the actor in the world")
+    reset_camera: whether the view is reset, as in ``add_volume``
+    name: of the actor; another of this name is replaced
+    culling: of faces, which a volume has none of
+    multi_colors: give each block of a ``MultiBlock`` a colour map of its own
+    mapper: of VTK's volume mappers; a VDI has its own, and none means a thing
+    scalar_bar_args: of the scalar bar, as in ``add_volume``
+    show_scalar_bar: whether there is a scalar bar; as the theme says
+    pickable: whether it can be picked
+    render: whether the plotter renders at once
+    user_matrix: places the actor in the world
+    """
+
+    reset_camera: bool | None = None
+    name: str | None = None
+    culling: bool | str = False
+    multi_colors: bool = False
+    mapper: str | None = option(None, _note_mapper)
+    scalar_bar_args: Mapping[str, Any] | None = option(None, kind="dict[str, Any] | None")
+    show_scalar_bar: bool | None = None
+    pickable: Any = option(True, kind="bool")
+    render: bool | None = True
+    user_matrix: MatrixLike | None = None
 
 
-@record
 @dataclass(frozen=True, eq=False)
 class InputOptions(Options):
-    """What a VDI is made of, from where, and by what."""
+    """What a VDI is made of, from where, and by what.
 
-    resolution: Sequence[float] | None = option(None, "spacing of a NumPy array; 1 by default")
-    camera: CameraLike | None = option(
-        None,
-        "the generating view",
-        "By default that of the first picture, and that of the frame where ``regenerate`` says so.",
-    )
-    device: DeviceLike | None = option(
-        None,
-        "the OpenCL device; by default ``PYVISTA_VDI_DEVICE``, else the best one found",
-    )
-    progress_bar: bool | Callable[[float], object] | None = option(
-        None,
-        "whether a bar shows how much is done; by default on a terminal, after a second of work",
-        "``True`` shows it elsewhere, too, ``False`` never; a callable gets the fraction done, and "
-        "stops the work if it returns ``False``. Ctrl-C stops it as well.",
-    )
+    resolution: spacing of a NumPy array; 1 by default
+    camera: the generating view
+        By default that of the first picture, and that of the frame where ``regenerate`` says so.
+    device: the OpenCL device; by default ``PYVISTA_VDI_DEVICE``, else the best one found
+    progress_bar: whether a bar shows how much is done; by default on a terminal, after a second
+        ``True`` shows it elsewhere, too, ``False`` never; a callable gets the fraction done, and
+        stops the work if it returns ``False``. Ctrl-C stops it as well.
+    """
+
+    resolution: Sequence[float] | None = None
+    camera: CameraLike | None = None
+    device: DeviceLike | None = None
+    progress_bar: bool | Callable[[float], object] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,7 +263,7 @@ def _of_vdi(shown: VDI, asked: Addition) -> _Shown:
 
 def _of_late_values(volume: Any, asked: Addition) -> _Shown:
     """Return the values of a volume, which the first picture has made for its view."""
-    asked.deferral.refuse_target(asked.target)
+    asked.target.refuse_deferred()
     fixed = {"coverage": asked.drawing.coverage != "bounds", "draw": asked.drawing.draw == "volume"}
     refused = " and ".join(each for each, given in fixed.items() if given)
     if refused:
@@ -339,7 +335,10 @@ def _of_volume(volume: Any, asked: Addition, plotter: Any) -> _Shown:
 def _source(volume: Any, asked: Addition) -> VDISource:
     """Return a source of VDIs of a volume, made as it was asked for."""
     image, name = as_grid(volume, asked.array.scalars, asked.making.resolution)
-    data, preference = held(image), asked.array.preference
+    # As add_volume, keep geometry and arrays by name as they are now, and share the points' values
+    data, preference = pv.ImageData(), asked.array.preference
+    data.ShallowCopy(image)
+    data.GetCellData().DeepCopy(image.GetCellData())
     named = None if name is None else data.GetPointData().GetArray(name)
     if named is not None and preference == "point":
         # As add_volume: another may be made the active one of the mapper's dataset
@@ -351,7 +350,10 @@ def _source(volume: Any, asked: Addition) -> VDISource:
     source.SetOptions(asked.options)
     source.SetDial(**asked.target.given)
     source.SetDevice(asked.making.device)
-    source.SetProgressCallback(progress_callback(asked.making.progress_bar))
+    progress: Any = asked.making.progress_bar
+    if not callable(progress):
+        progress = None if progress is False else DelayedBar(always=bool(progress))
+    source.SetProgressCallback(progress)
     if asked.making.camera is not None:
         source.SetCamera(asked.making.camera)
     return source

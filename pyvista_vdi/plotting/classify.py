@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import sys
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from pyvista_vdi.model.checks import as_float, suggestion
 from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.classification import Look
 from pyvista_vdi.model.lighting import Shading
-from pyvista_vdi.model.options import option, record
+from pyvista_vdi.model.options import option
 from pyvista_vdi.model.presets import presets
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import VDI
@@ -49,16 +49,17 @@ def _categories(count: Any) -> bool | int:
     return count  # type: ignore[no-any-return]
 
 
-@record
 @dataclass(frozen=True, eq=False)
 class Looks(Look):
-    """What a scalar looks like in a plotter, whose ``theme`` has the default colour map."""
+    """What a scalar looks like in a plotter, whose ``theme`` has the default colour map.
 
-    categories: bool | int = option(
-        False, "as many colours as there are different values, or this many", check=_categories
-    )
-    annotations: dict[float, str] | None = option(None, "texts beside the scalar bar, by value")
-    theme: Any = None
+    categories: as many colours as there are different values, or this many
+    annotations: texts beside the scalar bar, by value
+    """
+
+    categories: bool | int = option(False, _categories)
+    annotations: dict[float, str] | None = None
+    theme: Any = field(default=None)
 
     def of_rgba(self) -> Looks:
         """Return those of RGBA scalars: opacity is linear over ``clim``, as in ``add_volume``."""

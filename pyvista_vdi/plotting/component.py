@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import io
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, get_type_hints
 
@@ -33,10 +33,6 @@ class AddVDI(Component):
     plotter : pyvista.BasePlotter
         Held weakly.
     """
-
-    def __init__(self, plotter: Any) -> None:
-        super().__init__(plotter)
-        self._actors: list[Callable[[], Any]] = []
 
     @takes(
         **get_type_hints(Addition),
@@ -106,21 +102,18 @@ class AddVDI(Component):
             if isinstance(each, list):
                 found += each
             else:
-                self._actors.append(weakly(each))
+                self._made.append(weakly(each))
         return made  # type: ignore[no-any-return]
 
     __doc__ = __call__.__doc__  # PyVista hands out an object where users look for the method
 
     def __plotter_close__(self) -> None:
         """Release images and textures, even where the user keeps an actor."""
-        for weak in self._actors:
+        for weak in self._made:
             actor = weak()
             if actor is not None and actor.mapper is not None:
                 actor.mapper.driver.release()
-        self._actors.clear()
-
-    def __plotter_deep_clean__(self) -> None:
-        """Nothing else is held."""
+        self._made.clear()
 
 
 @pv.register_plotter_component("vdi", override=True)  # of registration._Pending
@@ -132,10 +125,6 @@ class PlotterVDIs(Component):
     plotter : pyvista.BasePlotter
         Held weakly.
     """
-
-    def __init__(self, plotter: Any) -> None:
-        super().__init__(plotter)
-        self._editors: list[TransferFunctionEditor] = []
 
     def export_html(self, filename: str | os.PathLike[str] | None) -> io.StringIO | None:
         """Write one HTML file that shows the plotter's scene, VDIs included, and turns it.
@@ -212,17 +201,14 @@ class PlotterVDIs(Component):
         from pyvista_vdi.plotting.editor import TransferFunctionEditor
 
         editor = TransferFunctionEditor(self._plotter, actor, loc, size)
-        for each in self._editors:
+        for each in self._made:
             if each.actor is actor:
                 each.remove()
-        self._editors = [*(each for each in self._editors if each.renderer is not None), editor]
+        self._made = [*(each for each in self._made if each.renderer is not None), editor]
         self._plotter.render()
         return editor
 
     def __plotter_close__(self) -> None:
         """Observe nothing any more."""
-        for each in self._editors:
+        for each in self._made:
             each.remove()
-
-    def __plotter_deep_clean__(self) -> None:
-        """Nothing else is held."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from threading import RLock
 from typing import Any
 
@@ -49,18 +48,3 @@ class DelayedBar:
             if self._bar is not None:
                 self._bar.close()
                 self._bar = None
-
-
-def progress_callback(
-    progress_bar: bool | Callable[[float], object] | None, label: str = "generating a VDI"
-) -> Callable[[float], object] | None:
-    """Return what to call with the fraction done.
-
-    ``None``: a bar on a terminal if the work takes over a second; ``True``: also elsewhere;
-    ``False``: none; a callable: that.
-    """
-    if callable(progress_bar):
-        return progress_bar
-    if progress_bar is False:
-        return None
-    return DelayedBar(always=bool(progress_bar), label=label)

@@ -44,6 +44,10 @@ class Component:
 
     def __init__(self, plotter: Any) -> None:
         self._held = weakref.ref(plotter)
+        self._made: list[Any] = []  # actors, weakly, or editors
+
+    def __plotter_deep_clean__(self) -> None:
+        """Nothing else is held."""
 
     @property
     def _plotter(self) -> Any:

@@ -87,18 +87,6 @@ def _as_uniform(grid: Any) -> Any:
     return image
 
 
-def held(image: Any) -> pv.ImageData:
-    """Return a grid that stays as it is now, as ``add_volume`` keeps what it is given.
-
-    Geometry and arrays by name are those of this moment. The point arrays are shared, so that their
-    values can be changed in place; the cell arrays are copied.
-    """
-    copy = pv.ImageData()
-    copy.ShallowCopy(image)
-    copy.GetCellData().DeepCopy(image.GetCellData())
-    return copy
-
-
 def _from_array(array: Any, resolution: Any) -> pv.ImageData:
     if array.ndim == 4 and array.shape[-1] in (3, 4):
         raise UnsupportedError(_rgba(array))

@@ -104,43 +104,6 @@ class Costs:
         """Return what a ray takes through a VDI, over one at its view, so many degrees away."""
         return 1 + (self.slope or 1.0) * (float(np.interp(angle, _ANGLES, _RISE)) - 1)
 
-    def better(
-        self, angle: float, pixels: float, seconds: float | None, ssim: float | None, bound: float
-    ) -> RenderMode:
-        """Choose how the next frame is to be drawn.
-
-        Where both keep a rate with fewer pixels, what the missing pixels lose is weighed against
-        what the VDI loses. Until both have told what they take it is the VDI, and what was drawn
-        last stays unless the other is better by more than predictions are wrong by.
-
-        The view is ``angle`` degrees from the generating view, ``pixels`` rays of the full frame
-        may meet the volume, and they may take ``seconds``, ``None`` at rest, where all are drawn.
-        ``ssim`` is the VDI's estimate for this view, and ``bound`` the least that does at rest.
-        """
-        own = _UNKNOWN_LOSS * min(1.0, angle / _LOST_FROM) if ssim is None else max(0.0, 1 - ssim)
-        if seconds is None and own > 1 - bound:
-            return "volume"
-        if self.volume is None or self.vdi is None:
-            return "vdi"
-        each = {"vdi": self.vdi * self.rise(angle), "volume": self.volume}
-        times = {way: self.fixed + max(pixels, 1.0) * ray for way, ray in each.items()}
-        other: RenderMode = "volume" if self.way == "vdi" else "vdi"
-        if seconds is None:
-            changes = times[other] < (1 - _SAVING) * times[self.way]
-        else:
-            room = max(seconds - self.fixed, 1e-9)
-            losses = {way: _loss_of_pixels((t - self.fixed) / room) for way, t in times.items()}
-            losses["vdi"] += own
-            changes = losses[other] < losses[self.way] - _GAIN
-        return other if changes else self.way
-
-
-def _loss_of_pixels(too_long: float) -> float:
-    """Return the SSIM lost by as few pixels as it takes to be this many times faster."""
-    step = max(1.0, too_long) ** 0.5
-    beyond = max(0.0, step - _STEPS[-1]) * (_LOST[-1] - _LOST[-2])
-    return float(np.interp(step, _STEPS, _LOST)) + beyond
-
 
 @dataclass(frozen=True)
 class Made:
@@ -280,7 +243,7 @@ def _watched(seen: Seen) -> Plan:
     if seen.draw == "auto" and not seen.joint and seen.volume == "whole":
         way: RenderMode = "volume"
         if made.coverage == 1 and (seen.moving or made.magnification <= FINE_ENOUGH):
-            way = _better(seen, made)
+            way = better_way(seen, made)
         costs = replace(seen.costs, way=way)
         return _planned(seen, way, made.content, costs=costs, **rest)
     return _planned(seen, "vdi", **rest)
@@ -355,13 +318,40 @@ def _unknown(seen: Seen) -> bool:
     return seen.view.distance(known.view, made.bounds) > _ANOTHER_ESTIMATE
 
 
-def _better(seen: Seen, made: Made) -> RenderMode:
-    """Choose VDI or volume, whichever is expected to give the better picture in time."""
-    known = seen.estimate
-    ssim = known.ssim if known is not None and known.vdi == made.known else None
-    bound = SIMILAR if seen.bound is None else seen.bound
-    seconds = seen.seconds if seen.moving else None
-    return seen.costs.better(made.angle, made.pixels, seconds, ssim, bound)
+def better_way(seen: Seen, made: Made) -> RenderMode:
+    """Choose VDI or volume, whichever is expected to give the better picture in time.
+
+    Where both keep a rate with fewer pixels, what the missing pixels lose is weighed against what
+    the VDI loses. Until both have told what they take it is the VDI, and what was drawn last stays
+    unless the other is better by more than predictions are wrong by.
+    """
+    known, costs = seen.estimate, seen.costs
+    seconds = seen.seconds if seen.moving else None  # at rest all pixels are drawn
+    own = _UNKNOWN_LOSS * min(1.0, made.angle / _LOST_FROM)  # what the VDI loses
+    if known is not None and known.vdi == made.known:
+        own = max(0.0, 1 - known.ssim)
+    if seconds is None and own > 1 - (SIMILAR if seen.bound is None else seen.bound):
+        return "volume"
+    if costs.volume is None or costs.vdi is None:
+        return "vdi"
+    each = {"vdi": costs.vdi * costs.rise(made.angle), "volume": costs.volume}
+    times = {way: costs.fixed + max(made.pixels, 1.0) * ray for way, ray in each.items()}
+    other: RenderMode = "volume" if costs.way == "vdi" else "vdi"
+    if seconds is None:
+        changes = times[other] < (1 - _SAVING) * times[costs.way]
+    else:
+        room = max(seconds - costs.fixed, 1e-9)
+        losses = {way: _loss_of_pixels((t - costs.fixed) / room) for way, t in times.items()}
+        losses["vdi"] += own
+        changes = losses[other] < losses[costs.way] - _GAIN
+    return other if changes else costs.way
+
+
+def _loss_of_pixels(too_long: float) -> float:
+    """Return the SSIM lost by as few pixels as it takes to be this many times faster."""
+    step = max(1.0, too_long) ** 0.5
+    beyond = max(0.0, step - _STEPS[-1]) * (_LOST[-1] - _LOST[-2])
+    return float(np.interp(step, _STEPS, _LOST)) + beyond
 
 
 def lacking(seen: Made, cone: float) -> list[tuple[str, str]]:

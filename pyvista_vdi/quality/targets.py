@@ -263,7 +263,7 @@ class _Trials:
     def _loss(self, rung: int) -> float:
         """Estimate 1 - SSIM of the target view."""
         vdi = self.vdi(rung)
-        return 1 - self._estimator.estimate(vdi, self.view.camera, self.view.size).ssim
+        return 1 - self._estimator.estimate(vdi, self.view.camera, self.view.window_size).ssim
 
     def _time(self, rung: int) -> float:
         """Return the seconds of a full frame."""

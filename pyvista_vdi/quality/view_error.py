@@ -129,7 +129,7 @@ class ViewErrorEstimator:
         It may have fewer lists than the VDI that is to be judged. Returns None where the volume is
         not in view; both edges of the window have at least 11 pixels.
         """
-        camera, size = request.camera, request.size
+        camera, size = request.camera, request.window_size
         region = seen_region(camera, size, (vdi.bounds, self._medium.volume.bounds))
         if region is None:
             return None
@@ -146,7 +146,7 @@ class ViewErrorEstimator:
             high = min(band, rows - row)
             corner = (left, top + row * COARSE)
             lens = camera.tile(size, corner, (columns * COARSE, high * COARSE))
-            part = request.replace(camera=lens, size=(columns, high))
+            part = request.replace(camera=lens, window_size=(columns, high))
             pictures[0].append(render_vdi(vdi, part))
             pictures[1].append(raycast_medium(self._medium, part))
         old, new = (over_background(np.concatenate(each), background) for each in pictures)
@@ -158,8 +158,8 @@ class ViewErrorEstimator:
         """Return the pictures of a view's tiles, by a VDI or, without one, by the volume."""
         pictures = []
         for column, row in sample.corners.tolist():
-            lens = request.camera.tile(request.size, (column, row), sample.size)
-            tile = request.replace(camera=lens, size=sample.size)
+            lens = request.camera.tile(request.window_size, (column, row), sample.size)
+            tile = request.replace(camera=lens, window_size=sample.size)
             drawn = raycast_medium(self._medium, tile) if vdi is None else render_vdi(vdi, tile)
             pictures.append(drawn)
         return pictures

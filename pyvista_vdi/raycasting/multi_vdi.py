@@ -213,8 +213,8 @@ def owned_image(
             own = request.replace(camera=one.camera, options=options)
             scenes.append(Scene.of(prepared_vdi(runtime, one.vdi), own, keep, segments=True))
         order = canonical_order(placed, [scene.reference_depth for scene in scenes])
-        width, height = request.size
-        cells = _Cells.of(scenes, request.size)
+        width, height = request.window_size
+        cells = _Cells.of(scenes, request.window_size)
         image = keep(runtime.result((height, width, 4), name="image"))
         owner = keep(runtime.result((height, width), np.int16, "owners"))
         _draw_alone(runtime, scenes, cells, image, owner)

@@ -18,16 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.checks import as_flag, as_float, as_range
-from pyvista_vdi.model.options import FrameRequest
+from pyvista_vdi.model.checks import Number, as_float, as_range
+from pyvista_vdi.model.options import FrameRequest, Options, option
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 
 Floats: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]
-
-#: Opacity from which on something is picked; what VTK's pickers take for volumes
-#: (``vtkCellPicker::VolumeOpacityIsovalue``).
-DEFAULT_OPACITY = 0.05
 
 
 @dataclass(frozen=True)
@@ -77,22 +73,26 @@ class Pick:
         return -math.expm1(-self.accumulated_optical_depth)
 
 
-class FirstHit(NamedTuple):
-    """What counts as a hit: some optical depth, and at least this much."""
+@dataclass(frozen=True)
+class FirstHit(Options):
+    """What counts as a hit.
 
-    optical_depth: float
-    accumulated: bool  # whether what the ray has met before counts, too
+    opacity_threshold: opacity that the hit has to reach, 0 to below 1
+        The default is ``vtkCellPicker``'s for volumes. With 0, whatever absorbs light is hit.
+    accumulated: compare the opacity of the ray from its beginning, 1 - exp(-(tau_0 + ... + tau_k))
+        The hit is the first supersegment with which the ray has become as opaque as that. ``False``
+        compares each supersegment's own, 1 - exp(-tau_k) over the length that the ray crosses of
+        it, and looks through haze; but it depends on how finely the lists are cut, and where the
+        ray runs across the lists, it crosses little of each.
+    """
 
-    @classmethod
-    def of(cls, opacity_threshold: float, accumulated: bool) -> FirstHit:
-        """Return it for an opacity, which is checked."""
-        threshold = as_float(opacity_threshold)
-        if not 0 <= threshold < 1:
-            raise InvalidArgumentError(
-                "opacity_threshold must be at least 0 and less than 1, which no medium reaches; "
-                f"got {opacity_threshold!r}"
-            )
-        return cls(-math.log1p(-threshold), as_flag(accumulated, "accumulated"))
+    opacity_threshold: float = option(0.05, Number("an opacity", high=np.nextafter(1.0, 0.0)))
+    accumulated: bool = True
+
+    @property
+    def optical_depth(self) -> float:
+        """Optical depth at which the threshold is reached."""
+        return -math.log1p(-self.opacity_threshold)
 
     def first(self, optical_depths: Floats) -> int | None:
         """Return which of the media that a ray meets is hit; ``None`` if none is."""
@@ -114,13 +114,13 @@ def pick_vdi(
     was classified from.
     """
     camera, options = request.camera, request.options
-    (x, y), (width, height) = as_range(pixel), request.size
+    (x, y), (width, height) = as_range(pixel), request.window_size
     if not (-0.5 <= x < width - 0.5 and -0.5 <= y < height - 0.5):
         raise InvalidArgumentError(
             f"pixel must be (x, y) inside the window of {width} x {height}, y = 0 at the bottom; "
             f"got {pixel!r}"
         )
-    ray = _Ray.of_pixel(vdi, camera, (x, y), request.size)
+    ray = _Ray.of_pixel(vdi, camera, (x, y), request.window_size)
     span = ray.span(vdi, request)
     if span is None:
         return None

@@ -16,6 +16,7 @@ from pyvista_vdi.device.constants import BUNDLE, GROUP, LIST_HEADER, LISTS_PER_I
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import lists_are_far
+from pyvista_vdi.model.packing import Packed8
 from pyvista_vdi.model.vdi import CELLS, VDI, DeferredVDI, made_vdi
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting.classified_values import ValuesLook
@@ -279,55 +280,53 @@ class PreparedVDI:
 
     def _prepare(self, vdi: VDI, keep: Keep) -> None:
         """Bring the lists to the device, exact or packed, and build the occupancy grid."""
-        runtime, packing = self.runtime, vdi.packing
         with contextlib.ExitStack() as stack:
-
-            def upload(array: NDArray[Any], name: str) -> DeviceBuffer:
-                return stack.enter_context(runtime.upload(array, name))
-
-            # Take the lists from where they were made, or upload them
-            held: dict[str, Any] = {}
-            if packing is not None:
-                self.depth_step, offsets = packing.step, vdi.offsets.view(np.int64)
-                for name in ("origins", "strides", "words"):
-                    held[name] = upload(getattr(packing, name), f"{name} of 8-byte supersegments")
-                held |= {"starts": upload(vdi.offsets, "list offsets"), "step": packing.step}
-                # Each list has a header, and words before its supersegments
-                counts = vdi.counts.ravel()
-                behind = np.cumsum(counts + LIST_HEADER * (counts > 0))
-                self._tell_sizes(int(behind[-1]), int(counts.max()))
-                headers = (behind - counts | counts << constants.FIRST_BITS).astype(np.uint64)
-                self.headers = keep(runtime.upload(headers, "list headers"))
-                occupied = np.flatnonzero(counts)
-                first = packing.codes(offsets[occupied])[0]
-                last = packing.codes(offsets[occupied + 1] - 1)[1]
-                ends = np.stack([packing.depths(occupied, each) for each in (first, last)], axis=1)
+            if vdi.packing is not None:
+                self._prepare_packed(vdi, vdi.packing, keep, stack.enter_context)
             else:
+                # Take the lists from where they were made, or upload them
+                held: dict[str, Any] = {}
                 if hasattr(vdi.late, "on"):
-                    held |= stack.enter_context(vdi.late.on(runtime))
+                    held |= stack.enter_context(vdi.late.on(self.runtime))
                 if not held:
                     arrays: Any = zip(_ARRAYS.items(), vdi.arrays, strict=True)
-                    held = {name: upload(array, what) for (name, what), array in arrays}
-                begins, ends = self._place_bundles(held, stack.enter_context)
-            self._tell_double_float(ends)
-
-            if packing is None:
-                self._prepare_lists(held, begins, keep)
-            else:
-                entries = runtime.result((max(1, self._entries), 2), np.uint32, "supersegments")
-                self.faces = self.media = keep(entries)
-                prepare = runtime.bind(
-                    "raycasting/prepare.cl",
-                    "prepare_packed",
-                    **held,
-                    centre_ray=self._centre,
-                    headers=self.headers,
-                    faces=self.faces,
-                )
-                count = partial(prepare, padded(vdi.counts.size, GROUP), GROUP)
-                self.occupancy = OccupancyGrid(self, count, keep)
-        if runtime.is_cpu:
+                    for (name, what), array in arrays:
+                        held[name] = stack.enter_context(self.runtime.upload(array, what))
+                self._prepare_lists(held, self._place_bundles(held, stack.enter_context), keep)
+        if self.runtime.is_cpu:
             self.lit = _share_lit(vdi, *self.depths)
+
+    def _prepare_packed(self, vdi: VDI, packing: Packed8, keep: Keep, briefly: Keep) -> None:
+        """Prepare lists of 8-byte supersegments behind their scales, and count them."""
+        runtime, self.depth_step = self.runtime, packing.step
+        held: dict[str, Any] = {"step": packing.step}
+        held["starts"] = briefly(runtime.upload(vdi.offsets, "list offsets"))
+        for name in ("origins", "strides", "words"):
+            what = f"{name} of 8-byte supersegments"
+            held[name] = briefly(runtime.upload(getattr(packing, name), what))
+        # Each list has a header, and words before its supersegments
+        counts, offsets = vdi.counts.ravel(), vdi.offsets.view(np.int64)
+        behind = np.cumsum(counts + LIST_HEADER * (counts > 0))
+        self._tell_sizes(int(behind[-1]), int(counts.max()))
+        headers = (behind - counts | counts << constants.FIRST_BITS).astype(np.uint64)
+        self.headers = keep(runtime.upload(headers, "list headers"))
+        occupied = np.flatnonzero(counts)
+        first = packing.codes(offsets[occupied])[0]
+        last = packing.codes(offsets[occupied + 1] - 1)[1]
+        ends = [packing.depths(occupied, each) for each in (first, last)]
+        self._tell_double_float(np.stack(ends, axis=1))
+        entries = runtime.result((max(1, self._entries), 2), np.uint32, "supersegments")
+        self.faces = self.media = keep(entries)
+        prepare = runtime.bind(
+            "raycasting/prepare.cl",
+            "prepare_packed",
+            **held,
+            centre_ray=self._centre,
+            headers=self.headers,
+            faces=self.faces,
+        )
+        count = partial(prepare, padded(counts.size, GROUP), GROUP)
+        self.occupancy = OccupancyGrid(self, count, keep)
 
     def _prepare_lists(self, arrays: dict[str, Any], begins: DeviceBuffer, keep: Keep) -> None:
         """Prepare exact lists, and count them in the occupancy grid.
@@ -355,12 +354,10 @@ class PreparedVDI:
         )
         self.occupancy = OccupancyGrid(self, partial(prepare, padded(bundles, GROUP), GROUP), keep)
 
-    def _place_bundles(
-        self, held: Mapping[str, Any], keep: Keep
-    ) -> tuple[DeviceBuffer, NDArray[np.float32]]:
-        """Find where bundles begin, on the device; nothing is uploaded.
+    def _place_bundles(self, held: Mapping[str, Any], keep: Keep) -> DeviceBuffer:
+        """Find where bundles begin, on the device, and what follows from the lists' sizes and ends.
 
-        Returns that, and the first front and the last back of the lists that are not empty, (n, 2).
+        Nothing is uploaded.
         """
         runtime, (width, height) = self.runtime, self.window
         bundles = -(-width // BUNDLE) * -(-height // BUNDLE)
@@ -387,7 +384,8 @@ class PreparedVDI:
             runtime.download_later(begins, entries, first=bundles)()
             self._tell_sizes(int(entries[0]), int(runtime.download(longest)[0]))
             found = runtime.download(ends)
-            return begins, found[~np.isnan(found[:, 0])]
+            self._tell_double_float(found[~np.isnan(found[:, 0])])  # lists that are not empty
+            return begins
 
     def _tell_sizes(self, entries: int, longest: int) -> None:
         """Set what follows from the entries of all lists, and the length of the longest."""
@@ -399,7 +397,10 @@ class PreparedVDI:
         self.most_media = sum(self.window) + longest
 
     def _tell_double_float(self, ends: NDArray[np.float32]) -> None:
-        """Set what follows from how thin lists are for where they lie in the bounds' depths."""
+        """Set what follows from how thin lists are for where they lie in the bounds' depths.
+
+        ``ends``: the first front and the last back of the lists that are not empty, (n, 2).
+        """
         near, far = (depth - self.depth_origin for depth in self.depths)
         front, back = np.clip(ends.T.astype(np.float64), near, far)
         rounded = np.maximum(np.abs(front), np.abs(back))
@@ -445,8 +446,7 @@ class KeptValues(PreparedVDI):
             name: keep(self.runtime.upload(array, _ARRAYS[name]))
             for name, array in zip(_COUNTED, arrays, strict=False)
         }
-        self._begins, ends = self._place_bundles(self._faces, keep)
-        self._tell_double_float(ends)
+        self._begins = self._place_bundles(self._faces, keep)
 
     def shown(self, look: ValuesLook) -> PreparedVDI:
         """Return what a transfer function shows: what is transparent is left out."""

@@ -26,7 +26,7 @@ def render_vdi(vdi: VDI, request: FrameRequest) -> NDArray[np.float32]:
     """
     runtime = get_runtime(request.device)
     prepared = prepared_vdi(runtime, vdi)
-    shape, out = (*request.size[::-1], 4), request.out
+    shape, out = (*request.window_size[::-1], 4), request.out
     with ExitStack() as stack:
         keep = stack.enter_context
         image = keep(runtime.result(shape, name="image", out=out))
@@ -43,10 +43,10 @@ def render_first_hits(vdi: VDI, request: FrameRequest, hit: FirstHit) -> NDArray
     prepared = prepared_vdi(runtime, vdi)
     with ExitStack() as stack:
         keep = stack.enter_context
-        image = keep(runtime.buffer(request.size[::-1], name="depth of first hits"))
+        image = keep(runtime.buffer(request.window_size[::-1], name="depth of first hits"))
         enqueue(Scene.of(prepared, request, keep, hit), image)
         t = runtime.download(image)
-    rays = pixel_rays(request.camera, request.size, vdi.bounds)
+    rays = pixel_rays(request.camera, request.window_size, vdi.bounds)
     return (t + rays.reference_depth).astype(np.float32)
 
 

@@ -54,7 +54,7 @@ class Scene:
         segments: bool = False,
     ) -> "Scene":
         """Make the rays of a frame, in buffers that are kept until it is drawn."""
-        camera, size, options = request.camera, request.size, request.options
+        camera, size, options = request.camera, request.window_size, request.options
         pixel_rays = rays.pixel_rays(camera, size, prepared.bounds)
         coordinates = pixel_rays.forms(prepared.list_rows)
         # The opacity multiplier is in the lengths that kernels measure by these forms: a length

@@ -85,12 +85,6 @@ class BrickLayout:
         n, points = x * y * z, before + 2**shift + behind
         return cls(shift, gradients, (x, y, z), n, before, points, points**3 * point_bytes, 8 * n)
 
-    @property
-    def numbers(self) -> dict[str, Any]:
-        """Return it as kernels take it."""
-        numbers = {"shift": self.shift, "points": self.points, "margin": self.before}
-        return {"counts": (*self.counts, 0), **numbers}
-
     def region(self, brick: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
         """Return where a brick lies in the grid and in its own points, both (z, y, x)."""
         x, y, _ = self.counts
@@ -198,12 +192,13 @@ class DeviceBricks(AbstractContextManager["DeviceBricks"]):
         self.copied += 1
 
 
-class StepSampler(AbstractContextManager["StepSampler"]):
+class StepSampler:
     """Samples the steps of rays in a volume that is on the device brick by brick.
 
     ``medium``: arguments ``MEDIUM_PARAMETERS``; ``variant``: what kernels are compiled for;
     ``room``: most steps of all rays at a time; ``ends``: where each ray ends in t, top row first.
-    ``samples`` are those of the steps that were sampled last, for kernels that march.
+    ``samples`` are those of the steps that were sampled last, for kernels that march; ``keep`` is
+    given their buffer.
     """
 
     def __init__(
@@ -214,21 +209,21 @@ class StepSampler(AbstractContextManager["StepSampler"]):
         variant: Variant,
         forms: DeviceBuffer,
         room: int,
+        keep: Callable[[DeviceBuffer], DeviceBuffer],
         ends: DeviceBuffer | None = None,
     ) -> None:
         self._runtime = runtime
         self._bricks = bricks
-        self.samples = runtime.buffer((room, 4), name="samples of steps")
+        self.samples = keep(runtime.buffer((room, 4), name="samples of steps"))
         rays: dict[str, Any] = {"forms": forms, "opaque_depth": ends, "visible": bricks.visible}
-        rays |= {"bricks": bricks.layout.numbers, "samples": self.samples}
+        layout = bricks.layout
+        numbers: dict[str, Any] = {"shift": layout.shift, "points": layout.points}
+        numbers |= {"margin": layout.before, "counts": (*layout.counts, 0)}
+        rays |= {"bricks": numbers, "samples": self.samples}
         defines = replace(variant, index="uint").defines  # of a brick's points
         self._launch = runtime.bind(
             "volume/bricks.cl", "sample_steps", defines, **medium, slots=bricks.slots, **rays
         )
-
-    def __exit__(self, *_: object) -> None:
-        self._runtime.finish()
-        self.samples.release()
 
     def sample(self, view: dict[str, Any]) -> None:
         """Sample steps of rays, as their numbers (``RaysOfView``) say."""

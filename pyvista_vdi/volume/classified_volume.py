@@ -9,7 +9,7 @@ import numpy as np
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, padded
 from pyvista_vdi.device.constants import GROUP
-from pyvista_vdi.errors import DeviceMemoryError, InvalidArgumentError
+from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.model.ambient_occlusion import AmbientOcclusion, OcclusionGrid
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.float32_limits import LARGEST_POWER, held_unit_distance, summation
@@ -61,7 +61,7 @@ class DeviceVolume:
     grid's rays, and take the steps that belong to the part. A volume for which ``room`` is too
     little is held brick by brick; without it in one piece or refused.
 
-    ``rays`` are marched through ``grid``, the volume or what it is a part of, by ``most_steps``,
+    ``rays`` are marched through the volume or the grid that it is a part of, by ``most_steps``,
     those of the longest. ``bricks`` are on the device where the whole volume is not: steps must be
     sampled by a :class:`~pyvista_vdi.volume.bricks.StepSampler` before kernels march along them.
     Kernels are compiled for ``variant``, but for what belongs to a view. InvalidArgumentError if
@@ -81,21 +81,13 @@ class DeviceVolume:
         **changes: Any,
     ) -> None:
         options = replace(options or MediumOptions(), **changes)
-        if not isinstance(volume, Volume):
-            raise InvalidArgumentError(f"expected a Volume, got {type(volume).__name__}")
-        if not isinstance(transfer_function, TransferFunction):
-            raise InvalidArgumentError(
-                f"expected a TransferFunction, got {type(transfer_function).__name__}"
-            )
         self.runtime, self.volume = runtime, volume
         self._looks, self._lights = transfer_function, options.lights
-        self.grid = volume if part is None else part.grid
-        self.sample_distance = checked_sample_distance(self.grid, options.sample_distance)
-        self.unit_distance = held_unit_distance(
-            transfer_function.unit_distance or self.grid.default_unit_distance, self.sample_distance
-        )
-        self.rays = GridRays(self.grid, self.sample_distance, self.unit_distance)
-        media = self.grid.length / self.sample_distance
+        grid = volume if part is None else part.grid
+        step = checked_sample_distance(grid, options.sample_distance)
+        unit_distance = transfer_function.unit_distance or grid.default_unit_distance
+        self.rays = GridRays(grid, step, held_unit_distance(unit_distance, step))
+        media = grid.length / step
         self.most_steps = math.ceil(media) + 1
         longer = len(transfer_function.opacities) * ENTRY_BYTES - TABLE_BYTES // 10
         if room is not None and longer > 0:
@@ -105,19 +97,18 @@ class DeviceVolume:
         voxels = held_voxels(runtime, volume, transfer_function, room)
         scale = voxels.scale
         table, self._visible, distances = _classified(runtime, volume, voxels, transfer_function)
-        nearest = transfer_function.interpolation == "nearest"
 
         # What samples are shaded by
-        scalars = volume.finite_range if part is None else lambda: part.scalar_range
         gradient = None
         if transfer_function.gradient_opacities is not None:
+            scalars = volume.finite_range() if part is None else part.scalar_range
             unit = 1.0 if scale is None else scale.unit
-            values = gradient_table(volume.spacing, scalars(), transfer_function, unit)
+            values = gradient_table(volume.spacing, scalars, transfer_function, unit)
             gradient = runtime.upload(values, "gradient opacity")
         shading = transfer_function.shading
         self.variant: Variant = replace(
             voxels.variant,
-            nearest=nearest,
+            nearest=transfer_function.interpolation == "nearest",
             by_scalar=table.by_scalar,
             compensated=summation(media),
             shaded=0 if shading is None else 2 if self._lights.headlight_only else 1,
@@ -128,11 +119,22 @@ class DeviceVolume:
             octants, name = volume.blanked, f"what is blank of volume {volume.name!r}"
             kept = uploads_of(volume).kept
             blanked = kept(runtime, "blanked", None, lambda: runtime.upload(octants, name))
-        asked = options.ambient_occlusion
-        occlusion = None if asked is None else OcclusionGrid(self.grid, asked)
-        strength = 0.0 if asked is None else asked.strength
+        infinite, size = (math.inf,) * 4, (*volume.dimensions, 0)
+        classified: dict[str, Any] = {
+            "size": size,
+            "held": size,
+            "macrocells": (*macrocells_over(volume.dimensions), 0),
+            "part_first": (0,) * 4 if part is None else (*part.first, 1),
+            "part_lower": infinite if part is None else (*part.lower, 0),
+            "part_upper": infinite if part is None else (*part.upper, 0),
+            "nodes": (0,) * 4,
+            "to_nodes": (0.0,) * 4,
+            "entries": table.entries,
+            "low": table.low,
+            "per_scalar": table.per_scalar,
+        }
         self._arguments: dict[str, Any] = {
-            "classified": _numbers(volume, table, part, occlusion, strength),
+            "classified": classified,
             "voxels": voxels.buffer,
             "table": table.buffer,
             "distances": distances if skip_empty else None,
@@ -142,13 +144,16 @@ class DeviceVolume:
             "ambient": None,
         }
         self._lit: tuple[Camera, DeviceBuffer] | None = None
-        if asked is not None and occlusion is not None:
+        if (asked := options.ambient_occlusion) is not None:
+            occlusion = OcclusionGrid(grid, asked)
             if voxels.buffer is None:
                 raise DeviceMemoryError(
                     f"ambient occlusion needs the volume {volume.name!r} in one piece, "
                     f"{bytes_text(device_bytes(volume, scale))}: raise memory_limit, leave "
                     "ambient_occlusion out, or use another device"
                 )
+            classified["nodes"] = (*occlusion.nodes, 0)
+            classified["to_nodes"] = (*(1 / edge for edge in occlusion.cell), asked.strength)
             self._arguments["ambient"] = self._occluded(asked, occlusion)
         # Last: nothing that fails then keeps them for as long as somebody looks at the error
         self.bricks: DeviceBricks | None = None
@@ -167,7 +172,7 @@ class DeviceVolume:
         if self._looks.shading is None:
             return self._arguments
         if self._lit is None or self._lit[0] != camera:
-            table = lighting_table(self.grid, camera, self._looks.shading, self._lights)
+            table = lighting_table(self.rays.grid, camera, self._looks.shading, self._lights)
             self._lit = (camera, self.runtime.upload(table, "lights"))
         return {**self._arguments, "lighting": self._lit[1]}
 
@@ -177,11 +182,11 @@ class DeviceVolume:
         looks = self._looks
         opacity = looks.replace(colors=np.zeros_like(looks.colors), shading=None)
         radius, directions = occlusion.radius_in(self.volume), occlusion.directions
-        key = (opacity, radius, directions, self.sample_distance)
+        key = (opacity, radius, directions, self.rays.sample_distance)
         names = ("classified", "voxels", "table", "blanked", "gradient")
         medium = {**{name: self._arguments[name] for name in names}, "visible": self._visible}
         variant = replace(self.variant, shaded=0, compensated=0, sharp=False)
-        lengths = self.sample_distance, self.unit_distance
+        lengths = self.rays.sample_distance, self.rays.unit_distance
         make = partial(ambient_transmittances, self.runtime, grid, medium, variant, lengths)
         return uploads_of(self.volume).kept(self.runtime, "occlusion", key, make)
 
@@ -247,35 +252,6 @@ def _media_of_scalars(runtime: Runtime, table: _Table, first: int, last: int) ->
         numbers = {"entries": table.entries, "low": table.low, "per_scalar": table.per_scalar}
         launch(padded(n, GROUP), GROUP, **numbers, first=first, count=n)
     return _Table(media, n, float(first), 1.0, by_scalar=True)
-
-
-def _numbers(
-    volume: Volume,
-    table: _Table,
-    part: GridPart | None,
-    occlusion: OcclusionGrid | None,
-    strength: float,
-) -> dict[str, Any]:
-    """Return the numbers of a classified volume as kernels take them."""
-    infinite, size = (math.inf,) * 4, (*volume.dimensions, 0)
-    nodes: tuple[float, ...] = (0,) * 4
-    to_nodes: tuple[float, ...] = (0,) * 4
-    if occlusion is not None:
-        nodes = (*occlusion.nodes, 0)
-        to_nodes = (*(1 / edge for edge in occlusion.cell), strength)
-    return {
-        "size": size,
-        "held": size,
-        "macrocells": (*macrocells_over(volume.dimensions), 0),
-        "part_first": (0,) * 4 if part is None else (*part.first, 1),
-        "part_lower": infinite if part is None else (*part.lower, 0),
-        "part_upper": infinite if part is None else (*part.upper, 0),
-        "nodes": nodes,
-        "to_nodes": to_nodes,
-        "entries": table.entries,
-        "low": table.low,
-        "per_scalar": table.per_scalar,
-    }
 
 
 def _visibility(

@@ -32,15 +32,15 @@ def raycast_volume(
     volume: Volume,
     transfer_function: TransferFunction,
     request: FrameRequest,
-    sampling: MediumOptions | None = None,
+    sampling: MediumOptions,
 ) -> NDArray[np.float32]:
     """Render a classified volume directly: premultiplied RGBA, float32 (H, W, 4), top row first.
 
     Samples at the midpoints of equal steps, composited front to back by the same kernel code that
     generates VDIs.
     """
-    sampling = sampling or MediumOptions()
-    room = picture_room(request.size, sampling.memory_limit, sampling.occlusion_bytes(volume))
+    occlusion = sampling.occlusion_bytes(volume)
+    room = picture_room(request.window_size, sampling.memory_limit, occlusion)
     medium = DeviceVolume(
         get_runtime(request.device),
         volume,
@@ -81,7 +81,7 @@ def raycast_medium(
     A cutoff of 0 ends no ray.
     """
     runtime, camera, options = medium.runtime, request.camera, request.options
-    width, height = size = request.size
+    width, height = size = request.window_size
     bricks, upload = medium.bricks, partial(runtime.upload, brief=True)
     march = medium.rays.forms(camera, size, options.clipping_planes)
     variant = replace(medium.variant, double_float=march.double_float)
@@ -118,7 +118,7 @@ def raycast_medium(
         items = block_items(width, rows)
         states = keep(runtime.buffer((items, 2, 4), name="states of rays"))
         room = items * _PART_STEPS
-        sampler = keep(StepSampler(runtime, bricks, medium_arguments, variant, forms, room, ends))
+        sampler = StepSampler(runtime, bricks, medium_arguments, variant, forms, room, keep, ends)
         launch = draw(samples=sampler.samples, states=states)
         for first_row in range(0, height, rows):
             now = min(rows, height - first_row)

@@ -6,7 +6,7 @@ import math
 import threading
 import weakref
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -114,17 +114,17 @@ def release_voxels(volume: Volume) -> None:
     del gone  # without the lock
 
 
+@dataclass(eq=False)
 class _Uploads:
     """What is on devices of one volume; the thread that uploads it holds its lock."""
 
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
-        #: What :meth:`kept` keeps, by device and what it is: the key that it was made for, and it.
-        self.made: dict[tuple[Runtime, str], tuple[Any, Any]] = {}
-        #: Scalar range of each macrocell of a volume that no device holds in one piece, by scaling.
-        self.ranges: dict[Any, NDArray[np.float32]] = {}
-        #: Whether float32 cannot hold float32 voxels' differences; None before anyone has looked.
-        self.too_large: bool | None = None
+    lock: Any = field(default_factory=threading.Lock)
+    #: What :meth:`kept` keeps, by device and what it is: the key that it was made for, and it.
+    made: dict[tuple[Runtime, str], tuple[Any, Any]] = field(default_factory=dict)
+    #: Scalar range of each macrocell of a volume that no device holds in one piece, by scaling.
+    ranges: dict[Any, NDArray[np.float32]] = field(default_factory=dict)
+    #: Whether float32 cannot hold float32 voxels' differences; None before anyone has looked.
+    too_large: bool | None = None
 
     def kept(self, runtime: Runtime, what: str, key: Any, make: Callable[[], T]) -> T:
         """Return what was made last, or make it if that was of another ``key``."""
@@ -156,10 +156,10 @@ def other_bytes(volume: Volume) -> int:
 
 def fits_whole(runtime: Runtime, volume: Volume, scale: Scale | None, room: Room) -> bool:
     """Return whether there is room for a volume in one piece."""
-    info, nbytes = runtime.info, device_bytes(volume, scale)
     made = uploads_of(volume).made.get((runtime, "voxels"))
     if room.limit is None and made is not None and made[0] == scale:
         return True
+    info, nbytes = runtime.info, device_bytes(volume, scale)
     if nbytes > info.max_allocation:
         return False
     nbytes += other_bytes(volume) + room.working

@@ -32,6 +32,8 @@ CLASSES = {
     "VDICollection": "model.collection",
 }
 WIDTH = 100
+#: What a function returns, by the values of an option.
+RETURNS = {"generate": ("classification", {"baked": "VDI", "deferred": "DeferredVDI"})}
 OTHERS = {"np.": "import numpy as np", "os.": "import os", "pv.": "import pyvista as pv"}
 
 
@@ -63,7 +65,7 @@ def wrapped(head, text, tail, margin=""):
 
 def overloads(function, name):
     """Return the definitions of a function, where an option says what it returns."""
-    ((option, kinds),) = function.returns.items()
+    option, kinds = RETURNS[name]
     standard = inspect.signature(function).parameters[option].default
     return "".join(
         "@overload\n"
@@ -98,8 +100,7 @@ def stubs():
     text = ""
     for name, function in sorted(vars(api).items()):
         if inspect.isfunction(function):
-            told = getattr(function, "returns", None)
-            text += overloads(function, name) if told else definition(function, name)
+            text += (overloads if name in RETURNS else definition)(function, name)
     made = inspect.signature(Settings)
     made = made.replace(parameters=[inspect.Parameter("self", 0), *made.parameters.values()])
     text += "class Settings:\n    given: dict[str, Any]\n"
@@ -113,6 +114,13 @@ def test_stubs_are_those_of_the_records():
     for file, text in stubs():
         found = (PACKAGE / file).read_text(encoding="utf-8")
         assert found == text, f"{file} is not of the records: python {__file__}"
+
+
+def test_docstrings_describe_every_parameter():
+    for function in (api.generate, api.render, api.pick, api.render_volume, Settings):
+        told = re.findall(r"^(\w[\w, ]*)(?: : .*)?\n    [\w`]", function.__doc__, re.MULTILINE)
+        named = {*inspect.signature(function).parameters} - {"look"}
+        assert named <= {*", ".join(told).split(", ")}
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from extension_marks import cases
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import VDIError
 from pyvista_vdi.model.classification import Classification
-from pyvista_vdi.model.options import declared
 
 ARRAY = np.random.default_rng(0).random((6, 5, 4), dtype=np.float32)
 VOLUME = pvdi.Volume(ARRAY)
@@ -35,7 +34,7 @@ def wrong_values(vdi):
 
 MADE = {"volume": VOLUME, "camera": CAMERA, "window_size": SIZE}
 TABLED = {**MADE, "transfer_function": TABLE}
-LOOK = tuple(declared(Classification))
+LOOK = tuple(Classification.declared)
 OF_GENERATE = [
     each.name
     for each in inspect.signature(pvdi.generate).parameters.values()
@@ -46,11 +45,7 @@ _OF_PICTURES = ("transmittance_cutoff", "regenerate_below", "coverage")
 #: For each entry: the function, what is right, and further arguments.
 ENTRIES = {
     "generate": lambda vdi: (pvdi.generate, TABLED, OF_GENERATE),
-    "looks": lambda vdi: (
-        pvdi.generate,
-        MADE,
-        LOOK[:-1],
-    ),
+    "looks": lambda vdi: (pvdi.generate, MADE, LOOK[:-1]),
     "render_volume": lambda vdi: (
         pvdi.render_volume,
         TABLED,

@@ -10,7 +10,7 @@ from drawing import generate_vdi, render_vdi
 from extreme_scenes import transfer, turned, view
 
 from pyvista_vdi import Volume
-from pyvista_vdi.model.options import FrameRequest
+from pyvista_vdi.model.options import FrameRequest, MediumOptions
 from pyvista_vdi.volume.render import raycast_volume
 
 pytestmark = pytest.mark.extremes
@@ -38,7 +38,7 @@ def digest(runtime, **options):
     )
     frame = FrameRequest(camera, SIZE, device=runtime)
     parts = [vdi.offsets, vdi.front, vdi.back, vdi.color, vdi.optical_depth]
-    parts.append(raycast_volume(scene, function, frame))
+    parts.append(raycast_volume(scene, function, frame, MediumOptions()))
     for new in turned(camera, scene):
         for shown in ({}, {"skip_empty": False}, {"preview_samples": 20}):
             parts.append(render_vdi(vdi, new, SIZE, device=runtime, **shown))

@@ -19,10 +19,7 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.options import (
-    MAX_PREVIEW_SAMPLES,
-    RenderOptions,
-)
+from pyvista_vdi.model.options import MAX_PREVIEW_SAMPLES, RenderOptions
 from pyvista_vdi.model.packing import DEPTH_CODES
 
 pytestmark = pytest.mark.fast

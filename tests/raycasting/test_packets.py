@@ -71,7 +71,7 @@ REGIONS = {"cropping": ((-0.5, 0.5, -0.5, 0.5, -0.5, 0.5), "fence")}
         (CAMERA.replace(model_transform=np.eye(4)), WINDOW, {}, OWN),
         (CAMERA.azimuth(1e-4), WINDOW, {}, OWN),  # which no ray leaves its list by
         (CAMERA, SIZE, {}, "raycast 1"),
-        (CAMERA, WINDOW, {"first_hit": FirstHit.of(0.5, True)}, "first_hits 1"),
+        (CAMERA, WINDOW, {"first_hit": FirstHit(0.5)}, "first_hits 1"),
         (TURNED, WINDOW, {}, BLOCKS),
         (CAMERA.azimuth(1), SIZE, {}, BLOCKS),
         (CAMERA.replace(window_center=(1e-3, 0)), WINDOW, {}, BLOCKS),

@@ -128,7 +128,7 @@ def test_the_kernel_sees_the_same_depth(runtime, kind):
         for options in THRESHOLDS:
             depth = pvdi.render_depth(vdi, camera, size, device=runtime, **options)
             request = FrameRequest(camera, size, RenderOptions(skip_empty=False), device=runtime)
-            hit = FirstHit.of(*options.values())
+            hit = FirstHit(**options)
             assert np.array_equal(depth, render_first_hits(vdi, request, hit))
             for x, y in pixels:
                 hit = pvdi.pick(vdi, camera, (x, y), size, **options)

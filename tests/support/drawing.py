@@ -16,7 +16,6 @@ from pyvista_vdi.model.options import (
 )
 from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.raycasting import multi_vdi, raycast
-from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit
 from pyvista_vdi.raycasting.scene import Scene
 from pyvista_vdi.volume import render
 
@@ -71,14 +70,6 @@ def frame(vdi, camera, size=None, **options):
 def render_vdi(vdi, camera, size=None, **options):
     """The picture of a VDI."""
     return raycast.render_vdi(vdi, frame(vdi, camera, size, **options))
-
-
-def render_first_hits(
-    vdi, camera, size=None, *, opacity_threshold=DEFAULT_OPACITY, accumulated=True, **options
-):
-    """The depths of first hits."""
-    hit = FirstHit.of(opacity_threshold, accumulated)
-    return raycast.render_first_hits(vdi, frame(vdi, camera, size, **options), hit)
 
 
 def draw(prepared, camera, size, image, *, first_hit=None, **options):

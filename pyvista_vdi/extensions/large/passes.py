@@ -284,7 +284,7 @@ class Task:
         runtime, march = medium.runtime, self.rays.forms(self.camera, self.size)
         variant = replace(medium.variant, double_float=march.double_float)
         columns, rows = window.size
-        voxel = min(medium.grid.spacing) / medium.sample_distance * (1 + 1e-9)
+        voxel = min(medium.rays.grid.spacing) / medium.rays.sample_distance * (1 + 1e-9)
         with (
             runtime.upload(packed(march.forms), "rays") as forms,
             runtime.buffer((rows, columns), name="optical depths") as depths,

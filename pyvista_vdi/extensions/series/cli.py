@@ -29,7 +29,7 @@ from pyvista_vdi.extensions.series.series import VDISeries, check_range
 from pyvista_vdi.io import read, read_info
 from pyvista_vdi.io.files import holds
 from pyvista_vdi.model.checks import as_number
-from pyvista_vdi.model.options import Deferral, GenerationOptions, declared
+from pyvista_vdi.model.options import Deferral, GenerationOptions
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.model.whole_file import check_writable, with_suffix
 from pyvista_vdi.plotting.progress import DelayedBar
@@ -46,7 +46,7 @@ def series(options: argparse.Namespace) -> int:
     if len(kinds) > 1:
         raise InvalidArgumentError("the files are VDIs or volumes, and not some of each")
     if of_vdis:
-        refuse(options, (*_OF_VOLUMES, "scheduler", *declared(Deferral)), "volumes")
+        refuse(options, (*_OF_VOLUMES, "scheduler", *Deferral.declared), "volumes")
         known = (as_number(read_info(file).metadata.get("time")) for file in files)
         steps = [Step(f, t, partial(read, f)) for f, t in zip(files, known, strict=True)]
     else:

@@ -7,7 +7,7 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.collection import VDICollection
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
-from pyvista_vdi.raycasting.picking import DEFAULT_OPACITY, FirstHit, Pick
+from pyvista_vdi.raycasting.picking import FirstHit, Pick
 from pyvista_vdi.vtk_pipeline.drawing.mapper import VDIMapperMethods
 from pyvista_vdi.vtk_pipeline.drawing.screen import LOOKUP, place_image
 from pyvista_vdi.vtk_pipeline.drawing.settings import OF_ACTORS, OF_SHADERS, refuse
@@ -27,8 +27,8 @@ refuse(VDIShaderProperty, OF_SHADERS)
 class VDIActorMethods:
     """What makes a volume show a VDI; mixed into VTK's and into PyVista's."""
 
-    def _become_vdi_actor(self: Any) -> None:
-        """Install a shader of its own."""
+    def __init__(self: Any) -> None:
+        super().__init__()
         super().SetShaderProperty(shader := VDIShaderProperty())  # type: ignore[misc]
         vtkOpenGLShaderProperty.SetFragmentShaderCode(shader, LOOKUP)
         place_image(self, 0, (0, 0), (1, 1))
@@ -156,7 +156,7 @@ class VDIActorMethods:
         mapper.SetOpacityMultiplier(multiplier)
 
     def pick(
-        self: Any, x: float, y: float, opacity_threshold: float = DEFAULT_OPACITY
+        self: Any, x: float, y: float, opacity_threshold: float = FirstHit.opacity_threshold
     ) -> Pick | None:
         """Return the supersegment that is seen at a place of the window.
 
@@ -186,7 +186,7 @@ class VDIActorMethods:
                 "nothing shows this actor yet: add it to a renderer of a window first"
             )
         there = [r for r in shown if r.IsInViewport(int(x), int(y))]
-        hit = FirstHit.of(opacity_threshold, accumulated=True)
+        hit = FirstHit(opacity_threshold)
         return self._driver.pick(there[0], x, y, hit) if there else None  # type: ignore[no-any-return]
 
     def regenerate(self: Any, camera: Any = None, window_size: Any = None) -> VDI:
@@ -253,6 +253,3 @@ class VDIActor(VDIActorMethods, vtkVolume):
     volume property is that of the source. Other coordinate systems than the world, and another
     shader, are refused by name.
     """
-
-    def __init__(self) -> None:
-        self._become_vdi_actor()

@@ -91,7 +91,6 @@ class Driver:
     def __init__(self) -> None:
         self.actor: Callable[[], Any] = lambda: None
         self.settings = MapperSettings()
-        self.device: Any = None
         self.input: Input | None = None
         self.said: set[Hashable] = set()  # warnings, or their causes
         self.failed: tuple[Any, ...] = ()  # stamps at which a VDI could not be made
@@ -225,12 +224,12 @@ class Driver:
                 return self._last
         # Raycast, and note what that took
         began = now()
-        drawn = raycast(sized, self.device, self._spare)
+        drawn = raycast(sized, self.settings.device, self._spare)
         seconds = now() - began
         self._spare = self._last.pixels
         window.pace.drawn(sized.size, sized.full_size, seconds, sized.way, sized.effort)
         # A volume's first picture has kernels compiled and voxels sent to the device
-        gpu = not get_runtime(self.device).is_cpu
+        gpu = not get_runtime(self.settings.device).is_cpu
         if sized.volume is None or sized.volume.pictures > 1:
             of = (sized.way, sized.angle, sized.covered_by(sized.bounds), seconds)
             self.costs = self.costs.took(*of, gpu=gpu)
@@ -238,7 +237,7 @@ class Driver:
             coarse, taken = frame.coarser(reduced(frame.full_size, FLOOR)), []
             for _ in range(_TRIALS):
                 began = now()
-                raycast(coarse, self.device, None)
+                raycast(coarse, self.settings.device, None)
                 taken.append(now() - began)
             pixels = coarse.covered_by(coarse.bounds)
             self.costs = self.costs.took("volume", 0.0, pixels, min(taken), gpu=gpu)
@@ -344,7 +343,7 @@ class Driver:
     def _stored(self, source: Input, frame: Frame) -> Frame | None:
         """Return the frame of a VDI that has no volume, and say what it lacks."""
         stamp, self.view = source.stamp(), frame.view
-        source.look(frame.view.camera, self.device)
+        source.look(frame.view.camera, self.settings.device)
         if stamp is None or stamp not in self.failed:
             self._update(source)
         vdi = source.last
@@ -366,7 +365,7 @@ class Driver:
         window, settings, view = frame.window, self.settings, frame.view
         # What is drawn in several views is out of date in none of them by itself
         one_view = len(renderers) == 1 and len(source.drivers) == 1
-        several = len(window.shown_in(frame.renderer)) > 1
+        joint = len(window.shown_in(frame.renderer)) > 1 and len(group_of(frame).members) > 1
         # Work may go on behind the frames where somebody watches, and can move
         vtk_window = window.vtk_window()
         here = bool(vtk_window.GetShowWindow()) and vtk_window.GetInteractor() is not None
@@ -419,7 +418,7 @@ class Driver:
             hand=moving and not settled,
             settled=settled and not moving,
             one_view=one_view,
-            joint=several and len(group_of(frame).members) > 1,
+            joint=joint,
             first_look=first,
             made=None if vdi is None else self._as_made(vdi, frame, made_of),
             volume=volume,  # type: ignore[arg-type]
@@ -669,7 +668,7 @@ class Driver:
             return seen
         source.set_view_if_missing(*seen)
         if source.last is None:
-            source.look(camera_of(seen[0], matrix), self.device)
+            source.look(camera_of(seen[0], matrix), self.settings.device)
         return seen
 
     def status(self) -> VDIStatus:

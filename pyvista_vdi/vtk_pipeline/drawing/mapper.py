@@ -27,8 +27,8 @@ class VDIMapperMethods:
     #: What draws; made with the mapper, before which PyVista's constructor sets some settings.
     driver: Any = None
 
-    def _become_vdi_mapper(self: Any) -> None:
-        """Install proxy and observers; to be called once, from ``__init__``."""
+    def __init__(self: Any, **given: Any) -> None:
+        super().__init__(**given)  # type: ignore[misc]
         self.driver: Driver = Driver()
         super().SetAutoAdjustSampleDistances(0)  # type: ignore[misc]
         super().SetImageSampleDistance(1.0)  # type: ignore[misc]
@@ -93,14 +93,6 @@ class VDIMapperMethods:
         source = self.driver.input
         return source if isinstance(source, VDISource) else None
 
-    def SetDevice(self, device: Any) -> None:
-        """Choose the OpenCL device; ``None`` is the default one."""
-        self.driver.device = device
-
-    def GetDevice(self) -> Any:
-        """Return the device as it was set."""
-        return self.driver.device
-
     # VTK's own switch would draw its volume into a smaller framebuffer
 
     def AutoAdjustSampleDistancesOn(self: Any) -> None:
@@ -132,6 +124,3 @@ class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
     A problem while drawing is reported once as a ``VDIWarning`` and the last good image stays:
     exceptions cannot pass through VTK's renderer. Where nothing is left to draw, nothing is shown.
     """
-
-    def __init__(self) -> None:
-        self._become_vdi_mapper()

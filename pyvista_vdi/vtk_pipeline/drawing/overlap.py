@@ -105,7 +105,7 @@ def _drawn(frames: list[Frame]) -> OwnedImage:
     first = replace(frames[0], depth=opaque_depth(frames)).coarser(size)  # which samples the depth
     seen = [first, *(frame.coarser(size) for frame in frames[1:])]
     # One device draws them all, and the same in whatever order they were added
-    devices = {repr(frame.mapper.driver.device): frame.mapper.driver.device for frame in frames}
+    devices = {repr(d): d for d in (frame.mapper.driver.settings.device for frame in frames)}
     began = now()
     picture = owned_image(
         [PlacedVDI(f.vdi, f.camera, f.options) for f in seen if f.vdi is not None],

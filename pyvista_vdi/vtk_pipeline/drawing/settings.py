@@ -14,7 +14,6 @@ from pyvista_vdi.model.options import (
     DrawingOptions,
     Option,
     RenderOptions,
-    declared,
 )
 from pyvista_vdi.model.types import Draw, Policy
 
@@ -32,9 +31,10 @@ class MapperSettings:
     image_distance: float = 1.0
     adjust: bool = True
     off_screen: bool = False
+    device: Any = None
 
 
-_DECLARED = declared(RenderOptions, DrawingOptions)
+_DECLARED = RenderOptions.declared | DrawingOptions.declared
 
 #: The settings, by VTK's names.
 SETTINGS: Mapping[str, Option] = {
@@ -65,6 +65,7 @@ SETTINGS: Mapping[str, Option] = {
         "whether off-screen windows are treated as if somebody watched them",
         check=partial(as_flag, name="InteractiveOffScreen"),
     ),
+    "Device": Option("device", None, "the OpenCL device; ``None`` is the default one"),
 }
 
 

@@ -142,21 +142,9 @@ class Window:
         if key not in self.of_frame or self.started is None:
             if known is None or known() is not renderer:
                 self._renderers[address] = weakly(renderer)
-                weak = weakref.ref(self)
-
-                def camera_changed(*_: Any) -> None:
-                    window = weak()
-                    if window is not None:
-                        window._camera_changed()
-
-                active = self.active  # no cycle through the observers
-
-                def drawing(renderer: Any, event: str) -> None:
-                    active.Set(renderer if event == "StartEvent" else None)
-
-                renderer.AddObserver("ActiveCameraEvent", camera_changed)
-                renderer.AddObserver("StartEvent", drawing)
-                renderer.AddObserver("EndEvent", drawing)
+                renderer.AddObserver("StartEvent", self._drawing)
+                renderer.AddObserver("EndEvent", self._drawing)
+                renderer.AddObserver("ActiveCameraEvent", self._camera_changed)
             self.of_frame[key] = list(_volumes_of(renderer.GetViewProps()))
         return self.of_frame[key]  # type: ignore[no-any-return]
 
@@ -192,8 +180,7 @@ class Window:
     @property
     def whole_picture(self) -> bool:
         """Whether this frame is a whole picture by itself, and not a tile of one."""
-        window = self.vtk_window()
-        return window is None or tuple(window.GetTileScale()) == (1, 1)
+        return tuple(self.vtk_window().GetTileScale()) == (1, 1)
 
     @property
     def keeps_picture(self) -> bool:
@@ -227,7 +214,7 @@ class Window:
             for driver in drivers:
                 driver.advance()
         self._foreground.close()
-        for runtime in {get_runtime(driver.device) for driver in drivers}:
+        for runtime in {get_runtime(driver.settings.device) for driver in drivers}:
             self._foreground.enter_context(runtime.foreground())
         samples = window.GetMultiSamples()
         if samples and self.pace.slow_samples:
@@ -271,7 +258,10 @@ class Window:
         self.pace.ended(seconds, self.moving)
         self.of_frame.clear()
 
-    def _camera_changed(self) -> None:
+    def _drawing(self, renderer: Any, event: str) -> None:
+        self.active.Set(renderer if event == "StartEvent" else None)
+
+    def _camera_changed(self, *_: Any) -> None:
         """Replace a preview on the screen by the full frame before a screenshot reads it.
 
         ``vtkWindowToImageFilter`` puts a copy of its own in place of each renderer's camera, and

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -123,15 +123,16 @@ def named_pair(name: str, what: str, *methods: Callable[..., Any]) -> Any:
     return methods
 
 
-def held_by_vtk(thing: Any) -> vtk.vtkCollection:
-    """Return what keeps a VTK object alive in C++ alone: what the user hands to an algorithm.
+def held_by_vtk(*things: Any) -> vtk.vtkCollection:
+    """Return what keeps VTK objects alive in C++ alone: what the user hands to an algorithm.
 
     Before 9.7 VTK frees a node of its table of wrappers twice (``vtkPythonUtil::FindObject``)
     where the attributes of an algorithm that is gone are the last in Python to hold an object
     of a Python class, such as a ``pyvista.VolumeProperty``, that lives on in C++.
     """
     held = vtk.vtkCollection()
-    held.AddItem(thing)
+    for thing in things:
+        held.AddItem(thing)
     return held
 
 
@@ -150,7 +151,7 @@ class SceneAlgorithm(Algorithm):
     _, GetCamera = accessors("camera", "the view, as it was set; ``None`` where none was")
 
     _property: vtk.vtkCollection | None = None  # with it alone
-    _observed: Sequence[tuple[vtk.vtkCollection, int]] = ()  # each with what observes it
+    _observed: tuple[vtk.vtkCollection, list[int]] | None = None  # and their observers
 
     def SetCamera(
         self, camera: CameraLike | None, model_transform: ArrayLike | None = None
@@ -194,9 +195,10 @@ class SceneAlgorithm(Algorithm):
 
     def _observe_property(self) -> None:
         """Modify this algorithm whenever the property or one of its functions is modified."""
-        for watched, tag in self._observed:
-            watched.GetItemAsObject(0).RemoveObserver(tag)
-        self._observed, prop = [], self.GetVolumeProperty()
+        if self._observed is not None:
+            for i, tag in enumerate(self._observed[1]):
+                self._observed[0].GetItemAsObject(i).RemoveObserver(tag)
+        self._observed, prop = None, self.GetVolumeProperty()
         if prop is None:
             return
         there = [prop, color_function(prop), prop.GetScalarOpacity()]
@@ -207,7 +209,7 @@ class SceneAlgorithm(Algorithm):
             algorithm._observe_property()  # its functions may be others now
             algorithm.Modified()
 
-        self._observed = [(held_by_vtk(each), watch(each, self, changed)) for each in there]
+        self._observed = held_by_vtk(*there), [watch(each, self, changed) for each in there]
 
 
 def watch(

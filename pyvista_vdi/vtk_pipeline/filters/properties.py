@@ -206,12 +206,6 @@ class _Function:
         table[first] = self.values[0]
         return np.clip(table, 0, 1)
 
-    def at_whole(self, low: int, n: int) -> NDArray[np.float64]:
-        """Return the values at n whole numbers."""
-        # VTK divides, which is exact by a power of two: no whole number falls short of a node
-        longer = 1 << (n - 1).bit_length()
-        return self.at(low + np.arange(longer + 1, dtype=np.float64))[:n]
-
 
 def _tabulate(
     functions: Sequence[_Function], volume: Any, nearest: bool
@@ -236,7 +230,10 @@ def _tabulate(
     if nearest and volume is not None and volume.array.dtype.kind in "iu":
         low, high = math.floor(low), math.ceil(high)
         if (n := high - low + 1) <= SAMPLED_ENTRIES:
-            return [function.at_whole(low, n) for function in functions], (low, high)
+            # VTK divides, which is exact by a power of two: no whole number falls short of a node
+            longer = 1 << (n - 1).bit_length()
+            whole = low + np.arange(longer + 1, dtype=np.float64)
+            return [function.at(whole)[:n] for function in functions], (low, high)
     inside = np.array([low, *x[(x > low) & (x < high)], high])
     grid = _common_grid(inside, SAMPLED_ENTRIES) if linear else None
     if grid is None:

@@ -6,12 +6,12 @@ import math
 import re
 from typing import Any
 
-from pyvista_vdi.model.options import GenerationOptions, declared
+from pyvista_vdi.model.options import GenerationOptions
 
 #: Value of the property View that means the camera properties.
 CAMERA = 1
 
-_DECLARED = declared(GenerationOptions)
+_DECLARED = GenerationOptions.declared
 
 
 def properties(lines: str) -> str:
