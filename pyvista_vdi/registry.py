@@ -13,7 +13,7 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from pyvista_vdi.errors import MissingDependencyError
+from pyvista_vdi.errors import MissingDependencyError, needing
 
 Places = Mapping[str, str]
 
@@ -31,19 +31,12 @@ class FileFormat:
     head: str = ""  # of a folder or ZIP of VDIs its file that is last in a folder, first in a ZIP
     page: bool = False  # may hold another's file: module has begins_with and data_in
     values: bool = False  # holds VDIs that keep values as well
-    needs: str = ""  # what its module cannot be loaded without, and the command that installs it
+    needs: str = "pyvista-vdi whole"  # to load its module, and the command that installs it
 
     def load(self) -> Any:
         """Return the module that reads and writes it."""
-        try:
+        with needing(f"{self.suffix} files need {self.needs}"):
             return import_module(self.module)
-        except ImportError as error:
-            if not self.needs:
-                raise
-            raise MissingDependencyError(
-                f"{self.suffix} files need {self.needs}, and it cannot be loaded ({error}); or use "
-                ".vdi files"
-            ) from error
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from pyvista_vdi.device import DeviceBuffer, Launch, Runtime, get_runtime, padde
 from pyvista_vdi.device.constants import CELL, CELL_ITEMS, GROUP, SEGMENT_SIZE, SPARE_SLOTS
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
+from pyvista_vdi.model.options import FrameRequest, RenderOptions
 from pyvista_vdi.model.ray_forms import Rectangle, pixels_of_points
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose, choose_merge
@@ -208,7 +208,7 @@ def owned_image(
         for one in placed:
             # All end at the same transmittance
             options = one.options.replace(
-                transmittance_cutoff=TRANSMITTANCE_CUTOFF, preview_samples=None
+                transmittance_cutoff=RenderOptions.transmittance_cutoff, preview_samples=None
             )
             own = request.replace(camera=one.camera, options=options)
             scenes.append(Scene.of(prepared_vdi(runtime, one.vdi), own, keep, segments=True))
@@ -332,7 +332,7 @@ def _draw_shared(
         walks.append((launch, variant.rays))
     variant, (width, height) = choose_merge(scenes), scenes[0].size
     window: dict[str, Any] = {"width": width, "height": height, "image": image, "owner": owner}
-    window["transmittance_cutoff"] = TRANSMITTANCE_CUTOFF
+    window["transmittance_cutoff"] = RenderOptions.transmittance_cutoff
     merge = runtime.bind(*variant.kernel, variant.switches, **window)
 
     streams, places, needed = len(walks), np.argsort(order).astype(np.int32), 0
