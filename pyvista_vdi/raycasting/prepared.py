@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime, constants, kept_together, padded
+from pyvista_vdi.device import DeviceBuffer, Keep, Runtime, constants, kept_together, padded
 from pyvista_vdi.device.constants import BUNDLE, GROUP, LIST_HEADER, LISTS_PER_ITEM, SLABS, STACK
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
@@ -53,9 +53,6 @@ _ARRAYS = {
 _COUNTED = ("starts", "fronts", "backs")
 #: What media are made of: colours and optical depths, or a deferred VDI's values.
 _NO_MEDIA = dict.fromkeys(("colors", "optical_depths", "means", "spreads", "steps", "integrals"))
-
-#: Keeps a buffer until all are made (:func:`pyvista_vdi.device.kept_together`), and returns it.
-Keep = Callable[[DeviceBuffer], DeviceBuffer]
 
 
 class OccupancyGrid:

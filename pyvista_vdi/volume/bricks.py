@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Runtime, bytes_text, kept_together
+from pyvista_vdi.device import DeviceBuffer, Keep, Runtime, bytes_text, kept_together
 from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.errors import DeviceMemoryError
 from pyvista_vdi.model.volume import Volume
@@ -209,7 +209,7 @@ class StepSampler:
         variant: Variant,
         forms: DeviceBuffer,
         room: int,
-        keep: Callable[[DeviceBuffer], DeviceBuffer],
+        keep: Keep,
         ends: DeviceBuffer | None = None,
     ) -> None:
         self._runtime = runtime

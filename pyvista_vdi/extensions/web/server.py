@@ -319,7 +319,7 @@ def serve(
         As for :func:`pyvista_vdi.generate`; shorter lists by default, which are sent sooner.
     max_clients : int
         Most pages at once.
-    device : str, int or device, optional
+    device : str, DeviceInfo or Runtime, optional
         See :func:`pyvista_vdi.list_devices`; all clients share it, one piece of work each in turn.
     wait : bool
         Print the URL, and return when Ctrl-C ends the server; ``False`` returns it at once, and
