@@ -9,11 +9,7 @@ import numpy as np
 from pyvista_vdi.errors import InvalidArgumentError, UnsupportedError
 from pyvista_vdi.generation.generate import generate_vdi
 from pyvista_vdi.model.checks import as_range
-from pyvista_vdi.model.options import (
-    Deferral,
-    GenerationOptions,
-    GenerationRequest,
-)
+from pyvista_vdi.model.options import Deferral, GenerationOptions, GenerationRequest
 from pyvista_vdi.model.transfer_function import TransferFunction
 from pyvista_vdi.model.vdi import DeferredVDI, lengths_of, made_vdi
 from pyvista_vdi.model.volume import Volume

@@ -56,7 +56,8 @@ def generate_vdi(request: GenerationRequest) -> VDI:
             records.fit()
             # Pack the lists behind those made before
             records.pack(lists)
-            report(progress, part.first_row / height)
+            if part.number > 0:
+                report(progress, part.first_row / height)
         arrays = lists.finished()
     report(progress, 1.0)
     return made_vdi(

@@ -219,7 +219,7 @@ def test_what_sees_nothing_makes_empty_lists(runtime, opacity, focal_point):
 def test_progress_runs_from_0_to_1_and_can_cancel(runtime):
     scene, seen = cases([9, 6000], "uint8", "nearest"), []
     generate_vdi(*scene, device=runtime, progress=seen.append)
-    assert seen == sorted(seen)
+    assert seen == sorted(set(seen))
     assert seen[0] >= 0
     assert seen[-1] == 1
     with pytest.raises(Cancelled):
