@@ -32,7 +32,7 @@ from pyvista_vdi.device.constants import GROUP, block_items
 from pyvista_vdi.measure.bench import accuracy, take_turns
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.options import TRANSMITTANCE_CUTOFF
+from pyvista_vdi.model.options import RenderOptions
 from pyvista_vdi.model.vdi import VDI
 
 Runs = Sequence[Segment]
@@ -138,7 +138,8 @@ class WorldRays:
         offsets, faces, media = map(self._upload, (offsets, faces, media))
         defines = {"BINARY_SEARCH": 1} if binary else {}
         self._draw = runtime.bind(*KERNEL, defines, offsets=offsets, faces=faces, media=media)
-        self._draw.set(lists_wide=self._wide, lists_high=self._high, cutoff=TRANSMITTANCE_CUTOFF)
+        cutoff = RenderOptions.transmittance_cutoff
+        self._draw.set(lists_wide=self._wide, lists_high=self._high, cutoff=cutoff)
 
     def image(self, camera: Camera, size: tuple[int, int]) -> NDArray[np.float32]:
         """Draw a frame; premultiplied RGBA (H, W, 4)."""
@@ -147,9 +148,8 @@ class WorldRays:
             runtime.upload(forms, "rays") as on_device,
             runtime.result((*size[::-1], 4), name="image") as image,
         ):
-            width, height = size
             of_frame = {"forms": on_device, "planes": planes, "image": image}
-            self._draw(block_items(*size), GROUP, width=width, height=height, **of_frame)
+            self._draw(block_items(*size), GROUP, width=size[0], height=size[1], **of_frame)
             return runtime.download(image)
 
     def _rays(self, camera: Camera, size: tuple[int, int]) -> tuple[NDArray[np.float32], int]:

@@ -115,9 +115,7 @@ class KernelBuildError(VDIError, RuntimeError):
 
     def __init__(self, message: str, *, log: str = "", options: str = "", source: str = "") -> None:
         super().__init__(message)
-        self.log = log
-        self.options = options
-        self.source = source
+        self.log, self.options, self.source = log, options, source
 
 
 class VDIFileError(VDIError, ValueError):
@@ -137,6 +135,15 @@ def naming(what: str) -> Iterator[None]:
         if what in str(error):
             raise
         raise type(error)(f"{what}: {error}") from error
+
+
+@contextmanager
+def needing(what: str) -> Iterator[None]:
+    """Raise MissingDependencyError if an import fails, by what it is needed for and a remedy."""
+    try:
+        yield
+    except ImportError as error:
+        raise MissingDependencyError(f"{what} ({error})") from error
 
 
 class VDIWarning(UserWarning):

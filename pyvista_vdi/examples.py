@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 #: Environment variable that names the folder with the volumes that are not shipped.
 DATA_VARIABLE = "PYVISTA_VDI_DATA"
 
-
 #: The shipped volumes by name, each with its file and what a sample measures. The brain has
 #: 181 x 217 x 181 points, 1 mm apart, x to the right, y to the front, z up; the mixing layer
 #: 192 x 192 x 192; the phantom, a cylinder of plastic with pins of known density, 412 x 412 x 19,

@@ -13,7 +13,7 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from pyvista_vdi.errors import MissingDependencyError
+from pyvista_vdi.errors import MissingDependencyError, needing
 
 Places = Mapping[str, str]
 
@@ -26,24 +26,17 @@ class FileFormat:
     module: str  # has read, read_info and, of single VDIs, write
     holds: str = "VDI"  # or "series", "set": what is read from it
     read_options: tuple[str, ...] = ()
-    write_options: tuple[str, ...] = ()  # beside compression and level
-    compressions: tuple[str, ...] = ()  # the first by default; without any neither is an option
+    write_options: tuple[str, ...] = ()  # beside compression, level and precision
+    compressions: tuple[str, ...] = ()  # the first by default; without any none is an option
     head: str = ""  # of a folder or ZIP of VDIs its file that is last in a folder, first in a ZIP
     page: bool = False  # may hold another's file: module has begins_with and data_in
     values: bool = False  # holds VDIs that keep values as well
-    needs: str = ""  # what its module cannot be loaded without, and the command that installs it
+    needs: str = "pyvista-vdi whole"  # to load its module, and the command that installs it
 
     def load(self) -> Any:
         """Return the module that reads and writes it."""
-        try:
+        with needing(f"{self.suffix} files need {self.needs}"):
             return import_module(self.module)
-        except ImportError as error:
-            if not self.needs:
-                raise
-            raise MissingDependencyError(
-                f"{self.suffix} files need {self.needs}, and it cannot be loaded ({error}); or use "
-                ".vdi files"
-            ) from error
 
 
 @dataclass(frozen=True)

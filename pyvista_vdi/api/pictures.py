@@ -73,7 +73,7 @@ def render(
     view = Camera.from_any(camera)
     shown: list[Any] = list(vdi) if isinstance(vdi, list | tuple) else [vdi]
     if look:
-        shown = _with_look(shown, look, render, device)
+        shown = _with_look(shown, look, render, device=device)
     if isinstance(vdi, list | tuple) or model_transforms is not None:
         for name in options.given:
             raise InvalidArgumentError(f"{name} is for a single VDI: leave it out for several")
@@ -131,7 +131,7 @@ def render_depth(
         nothing is hit. It can be passed as another :func:`render`'s ``opaque_depth``.
     """
     view = Camera.from_any(camera)
-    (shown,) = _with_look([vdi], look, render_depth, device) if look else [vdi]
+    (shown,) = _with_look([vdi], look, render_depth, device=device) if look else [vdi]
     seen, usual = _in_view(shown, view)
     size: Any = usual if window_size is None else window_size
     request = FrameRequest(view, size, options, opaque_depth, device)
@@ -221,7 +221,7 @@ def render_volume(
 
 
 def _with_look(
-    shown: list[Any], look: dict[str, Any], function: Callable[..., Any], device: Any = None
+    shown: list[Any], look: dict[str, Any], function: Callable[..., Any], **where: Any
 ) -> list[Any]:
     """Return what is shown, with a look where it stores scalars; refused where nothing does."""
     ends = {each.value_range for each in shown if getattr(each, "value_range", None)}
@@ -231,7 +231,7 @@ def _with_look(
     if len(ends) > 1 and not look.keys() & {"clim", *IN_PLACE}:
         look["clim"] = (min(low for low, _ in ends), max(high for _, high in ends))
     return [
-        each.classified(**look, device=device) if getattr(each, "value_range", None) else each
+        each.classified(**look, **where) if getattr(each, "value_range", None) else each
         for each in shown
     ]
 

@@ -250,15 +250,6 @@ def _describe(cl: ModuleType, device: Any, platform_index: int, device_index: in
 INTEL_LIBRARY = "libintelocl.so"
 
 
-def intel_library() -> Path | None:
-    """Return the absolute path of pip's Intel CPU runtime, or None."""
-    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-        files = importlib.metadata.files("intel-opencl-rt") or []
-        paths = [Path(str(each.locate())).resolve() for each in files if each.name == INTEL_LIBRARY]
-        return next((path for path in paths if path.is_file()), None)
-    return None
-
-
 @contextlib.contextmanager
 def drivers_visible() -> Iterator[None]:
     """While inside, the loader sees the system's drivers and pip's; the environment is put back.
@@ -268,7 +259,11 @@ def drivers_visible() -> Iterator[None]:
     finds its library. That of pyopencl's Linux wheels reads the folder ``OCL_ICD_VENDORS`` in place
     of ``/etc/OpenCL/vendors``: here a temporary one, with the system's vendor files and one more.
     """
-    library = intel_library()
+    library = None
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+        files = importlib.metadata.files("intel-opencl-rt") or []
+        paths = [Path(str(each.locate())).resolve() for each in files if each.name == INTEL_LIBRARY]
+        library = next((path for path in paths if path.is_file()), None)
     # Who has set the variable has decided which drivers are seen
     if library is None or sys.platform != "linux" or os.environ.get("OCL_ICD_VENDORS"):
         yield

@@ -83,8 +83,12 @@ class DeviceBuffer:
         self.release()
 
 
+#: Keeps a buffer until those beside it are made, or used, and returns it.
+Keep = Callable[[DeviceBuffer], DeviceBuffer]
+
+
 @contextlib.contextmanager
-def kept_together() -> Iterator[Callable[[DeviceBuffer], DeviceBuffer]]:
+def kept_together() -> Iterator[Keep]:
     """Keep the buffers that the block hands over, or release them all if it fails.
 
     An object whose buffers are made one after the other is otherwise kept half made by the error

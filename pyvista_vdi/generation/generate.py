@@ -51,7 +51,7 @@ def generate_vdi(request: GenerationRequest) -> VDI:
             # Sample the rays' steps, merge what is alike, and make room in records that are full
             for chunk in march.chunks(part):
                 march.advance(chunk)
-                records.make_room(last=chunk.last)
+                records.make_room(last=chunk.stop >= march.most_steps)
             # Fit each record to the budget
             records.fit()
             # Pack the lists behind those made before

@@ -1,6 +1,6 @@
 """Slices of rays and their records: marched and merged, fitted to the budget, and packed."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from pyvista_vdi.device import DeviceBuffer, Runtime
+from pyvista_vdi.device import DeviceBuffer, Keep, Runtime
 from pyvista_vdi.device.constants import GROUP, RUN_WORDS, block_items
 from pyvista_vdi.generation.list_arrays import LISTS_PER_GROUP, SUPERSEGMENT_BYTES, GrowingLists
 from pyvista_vdi.model.camera import Camera
@@ -35,9 +35,6 @@ _SLICES_IN_LIMIT = 4
 #: Runs that a ray's record keeps for homogeneity: more than a ray through most data has, so that it
 #: cuts what was sampled and not what least error has left of it.
 _UNMERGED_RUNS = 512
-
-#: Keeps what is made for a march until it is done (``ExitStack.enter_context``), and returns it.
-Keep = Callable[[Any], Any]
 
 
 class Slice(NamedTuple):
@@ -193,18 +190,11 @@ class Records:
         self._pack(self.items, GROUP, view=self.view, **places)
 
 
-class Chunk(NamedTuple):
-    """Steps that all rays of a slice march before their records are looked at."""
-
-    first_step: int
-    steps: int
-    last: bool
-
-
 class March:
     """Marches the rays of slices, a chunk of steps at a time.
 
-    ``entering``: the light that enters part of a grid along each ray of the window, 0 to 1.
+    ``entering``: the light that enters part of a grid along each ray of the window, 0 to 1. No ray
+    has more than ``most_steps``.
     """
 
     def __init__(
@@ -215,7 +205,7 @@ class March:
         keep: Keep,
         entering: DeviceBuffer | None = None,
     ) -> None:
-        self._records, self._most_steps, bricks = records, medium.most_steps, medium.bricks
+        self._records, self.most_steps, bricks = records, medium.most_steps, medium.bricks
         runtime, arguments = records.runtime, medium.medium_arguments(camera)
         # Opacity is summed up from 0 in every run
         compensated = 2 if medium.variant.compensated > 1 else 0
@@ -243,19 +233,19 @@ class March:
             counts=records.counts,
         )
 
-    def chunks(self, part: Slice) -> list[Chunk]:
-        """Return the chunks that reach the end of a slice's longest ray."""
-        found: list[Chunk] = []
-        first, steps, most = 0, _FIRST_CHUNK_STEPS, self._most_steps
-        while first < min(most, self._longest[part.number]):
-            found.append(Chunk(first, steps, first + steps >= most))
+    def chunks(self, part: Slice) -> list[range]:
+        """Return the steps up to the end of a slice's longest ray, in chunks."""
+        found: list[range] = []
+        first, steps = 0, _FIRST_CHUNK_STEPS
+        while first < min(self.most_steps, self._longest[part.number]):
+            found.append(range(first, first + steps))
             first, steps = first + steps, CHUNK_STEPS
         return found
 
-    def advance(self, chunk: Chunk) -> None:
+    def advance(self, chunk: range) -> None:
         """Sample a chunk of steps, and merge them with the last runs where they are alike."""
         records = self._records
-        records.view["first_step"], records.view["steps"] = chunk.first_step, chunk.steps
+        records.view["first_step"], records.view["steps"] = chunk.start, len(chunk)
         if self._sampler is not None:
             self._sampler.sample(records.view)
         self._launch(records.items, view=records.view)

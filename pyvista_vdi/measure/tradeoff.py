@@ -17,7 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError, VDIError
+from pyvista_vdi.errors import InvalidArgumentError, VDIError, needing
 from pyvista_vdi.io import whole_file
 from pyvista_vdi.measure import bench as measuring
 from pyvista_vdi.measure.bench import Bench, Step, ratio, take_turns
@@ -150,12 +150,8 @@ class Tradeoff:
 
     def save_plot(self, path: str | os.PathLike[str]) -> Path:
         """Write SSIM over each cost as a PNG by Matplotlib; it appears whole or not at all."""
-        if find_spec("matplotlib") is None:
-            raise MissingDependencyError(
-                "plots are drawn by Matplotlib, which is not installed: install it by pip install "
-                '"pyvista-vdi[plot]"'
-            )
-        from matplotlib.figure import Figure
+        with needing("plots are drawn by Matplotlib: pip install 'pyvista-vdi[plot]'"):
+            from matplotlib.figure import Figure
 
         figure = Figure(figsize=(14.0, 10.0), layout="constrained")
         figure.suptitle(f"{self.plan['name']}: what settings cost and give (better: up and left)")

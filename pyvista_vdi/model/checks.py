@@ -47,7 +47,7 @@ class Number:
     """A check of a number from ``low`` to ``high``, finite; without these if ``open_ended``.
 
     ``of`` says in an error what it is a number of. ``whole``: whether it is a whole number;
-    ``none``: whether None passes.
+    ``below``: whether it must be less than ``high``; ``none``: whether None passes.
     """
 
     of: str = ""
@@ -55,6 +55,7 @@ class Number:
     high: float = math.inf
     whole: bool = False
     open_ended: bool = False
+    below: bool = False
     name: str = ""
     none: bool = False
 
@@ -64,10 +65,12 @@ class Number:
             return None
         number = as_whole(value) if self.whole else as_number(value)
         at_end = number in (self.low, self.high) and self.open_ended
+        at_end = at_end or (number == self.high and self.below)
         if not self.low <= number <= self.high or number == math.inf or at_end:
             wanted = self.of or ("a whole number" if self.whole else "a finite number")
             if self.high < math.inf:
-                ends = " between {} and {}" if self.open_ended else " from {} to {}"
+                ends = " from {} to below {}" if self.below else " from {} to {}"
+                ends = " between {} and {}" if self.open_ended else ends
                 wanted += ends.format(self.low, self.high)
             elif self.low > -math.inf:
                 wanted += f" above {self.low}" if self.open_ended else f", {self.low} or above"

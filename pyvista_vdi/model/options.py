@@ -41,15 +41,6 @@ from pyvista_vdi.model.types import (
 )
 from pyvista_vdi.model.volume import Volume
 
-#: Most supersegments that a list may be allowed.
-MAX_SUPERSEGMENTS = 4096
-
-#: A ray ends where less transmittance than this is left, unless told otherwise: no channel loses
-#: more than that.
-TRANSMITTANCE_CUTOFF = 1e-6
-#: Most samples of a ray in a preview: each has a half, and float32 counts halves up to 2^24.
-MAX_PREVIEW_SAMPLES = 2**23
-
 #: Origin and normal of each plane; the side that the normal points to is kept.
 Planes: TypeAlias = tuple[tuple[float, ...], ...]
 
@@ -210,7 +201,7 @@ class GenerationOptions(MediumOptions):
         On devices and in files: see :meth:`VDI.with_precision`.
     """
 
-    max_supersegments: int = option(20, Number(low=1, high=MAX_SUPERSEGMENTS, whole=True))
+    max_supersegments: int = option(20, Number(low=1, high=4096, whole=True))
     criterion: Criterion = "least-error"
     tolerance: float = option(0.0, Number())
     view_cone: float = option(60.0, Number("an angle in degrees", high=90))
@@ -375,10 +366,9 @@ class RenderOptions(Options):
     clipping_planes: Any = option(None, checked_planes, "PlanesLike | None")
     cropping: Any = option(None, Cropping.from_any, "CroppingLike | None")
     opacity_multiplier: float = option(1.0, Number("a factor of the extinction"))
-    preview_samples: int | None = option(None, Number(low=1, high=MAX_PREVIEW_SAMPLES, whole=True))
-    transmittance_cutoff: float = option(
-        TRANSMITTANCE_CUTOFF, Number("a share of the light", high=np.nextafter(1.0, 0.0))
-    )
+    # Each sample has a half, and float32 counts halves up to 2^24
+    preview_samples: int | None = option(None, Number(low=1, high=2**23, whole=True))
+    transmittance_cutoff: float = option(1e-6, Number(high=1, below=True))
     skip_empty: bool = field(default=True)
 
     replace = replace

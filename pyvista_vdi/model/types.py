@@ -55,8 +55,7 @@ OcclusionLike: TypeAlias = Annotated[
 ]
 PlanesLike: TypeAlias = Annotated[ArrayLike, "array_like of float, shape (k, 6)"]
 DepthLike: TypeAlias = Annotated[ArrayLike, "array_like of float32, shape (H, W)"]
-#: A name or an index of the list of devices, or a device in use.
-DeviceLike: TypeAlias = Annotated[str | int | Any, "str, int or device"]
+DeviceLike: TypeAlias = Annotated[str | Any, "str, DeviceInfo or Runtime"]
 #: A client of a Dask cluster, or the address of its scheduler.
 ClientLike: TypeAlias = str | Any
 

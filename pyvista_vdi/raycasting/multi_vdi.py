@@ -21,7 +21,7 @@ from pyvista_vdi.device import DeviceBuffer, Launch, Runtime, get_runtime, padde
 from pyvista_vdi.device.constants import CELL, CELL_ITEMS, GROUP, SEGMENT_SIZE, SPARE_SLOTS
 from pyvista_vdi.errors import InvalidArgumentError
 from pyvista_vdi.model.camera import Camera
-from pyvista_vdi.model.options import TRANSMITTANCE_CUTOFF, FrameRequest, RenderOptions
+from pyvista_vdi.model.options import FrameRequest, RenderOptions
 from pyvista_vdi.model.ray_forms import Rectangle, pixels_of_points
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose, choose_merge
@@ -208,7 +208,7 @@ def owned_image(
         for one in placed:
             # All end at the same transmittance
             options = one.options.replace(
-                transmittance_cutoff=TRANSMITTANCE_CUTOFF, preview_samples=None
+                transmittance_cutoff=RenderOptions.transmittance_cutoff, preview_samples=None
             )
             own = request.replace(camera=one.camera, options=options)
             scenes.append(Scene.of(prepared_vdi(runtime, one.vdi), own, keep, segments=True))
@@ -219,9 +219,9 @@ def owned_image(
         owner = keep(runtime.result((height, width), np.int16, "owners"))
         _draw_alone(runtime, scenes, cells, image, owner)
         if len(cells.shared):
-            merged = _MergedCells(runtime, scenes, order, margin)
             slots = max(_slots.get(one.vdi, _FIRST_SLOTS) for one in placed)
-            needed = merged.draw(cells.shared, slots, image, owner)
+            into = cells.shared, slots, image, owner
+            needed = _draw_shared(runtime, scenes, order, margin, *into)
             for one in placed:
                 _slots[one.vdi] = math.ceil(_SPARE_SLOTS * max(needed, 1))
         return OwnedImage(runtime.download(image), runtime.download(owner))
@@ -302,61 +302,42 @@ def _draw_alone(
             take(items, group, vdi=cells.NOBODY, picture=image)
 
 
-class _MergedCells:
-    """Draws a frame's cells in which several VDIs are met.
+def _draw_shared(
+    runtime: Runtime,
+    scenes: Sequence[Scene],
+    order: Sequence[int],
+    margin: float,
+    cells: NDArray[np.int32],
+    slots: int,
+    image: DeviceBuffer,
+    owner: DeviceBuffer,
+) -> int:
+    """Draw cells in which several VDIs are met, and return how many slots their rays have needed.
 
     ``order`` is that in which the scenes' streams of segments are written, and sums are formed;
-    ``margin`` is :func:`owned_image`'s.
+    ``margin`` is :func:`owned_image`'s. Where ``slots`` are too few, cells are drawn again.
     """
-
-    def __init__(
-        self,
-        runtime: Runtime,
-        scenes: Sequence[Scene],
-        order: Sequence[int],
-        margin: float,
-    ) -> None:
-        self._runtime = runtime
-        self._streams_of = np.argsort(order).astype(np.int32)
-        nearest = min(scene.reference_depth for scene in scenes)
-        self._walks: list[tuple[Launch, int]] = []  # and how many rays a work-item follows
-        for number, i in enumerate(order):
-            scene, variant = scenes[i], choose(scenes[i])
-            launch = runtime.bind(
-                *variant.kernel,
-                variant.switches,
-                **scene.arguments(),
-                number=number,
-                depth_shift=scene.reference_depth - nearest,
-                margin=margin,
-            )
-            self._walks.append((launch, variant.rays))
-        merge = choose_merge(scenes)
-        self._merged_rays = merge.rays
-        self._merge = runtime.bind(
-            *merge.kernel,
-            merge.switches,
-            width=scenes[0].size[0],
-            height=scenes[0].size[1],
-            transmittance_cutoff=TRANSMITTANCE_CUTOFF,
+    nearest = min(scene.reference_depth for scene in scenes)
+    walks: list[tuple[Launch, int]] = []  # and how many rays a work-item follows
+    for number, i in enumerate(order):
+        scene, variant = scenes[i], choose(scenes[i])
+        launch = runtime.bind(
+            *variant.kernel,
+            variant.switches,
+            **scene.arguments(),
+            number=number,
+            depth_shift=scene.reference_depth - nearest,
+            margin=margin,
         )
+        walks.append((launch, variant.rays))
+    variant, (width, height) = choose_merge(scenes), scenes[0].size
+    window: dict[str, Any] = {"width": width, "height": height, "image": image, "owner": owner}
+    window["transmittance_cutoff"] = RenderOptions.transmittance_cutoff
+    merge = runtime.bind(*variant.kernel, variant.switches, **window)
 
-    def draw(
-        self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer
-    ) -> int:
-        """Draw cells, again where ``slots`` are too few, and return how many rays needed."""
-        needed = self._pass(cells, slots, image, owner)
-        most = int(needed.max())
-        if most > slots:
-            self._pass(cells[needed > slots], most, image, owner)
-        return most
-
-    def _pass(
-        self, cells: NDArray[np.int32], slots: int, image: DeviceBuffer, owner: DeviceBuffer
-    ) -> NDArray[np.int32]:
-        """Draw cells whose rays have room, and return how many slots those of each have needed."""
-        runtime, streams = self._runtime, len(self._walks)
-        room = _POOL_BYTES_CPU if runtime.is_cpu else _POOL_BYTES
+    streams, places, needed = len(walks), np.argsort(order).astype(np.int32), 0
+    room = _POOL_BYTES_CPU if runtime.is_cpu else _POOL_BYTES
+    while len(cells):
         ray_bytes = 4 * SEGMENT_SIZE * (slots + SPARE_SLOTS)
         most = min(max(1, room // (CELL_ITEMS * ray_bytes)), len(cells))  # cells of a band
         rays = most * CELL_ITEMS
@@ -365,23 +346,24 @@ class _MergedCells:
             runtime.result((streams, rays), np.int32, "ends of the streams") as ends,
             runtime.result((streams, rays), np.uint8, "VDIs met") as contributes,
             runtime.result((rays,), name="ends of light") as dark,
-            runtime.buffer((len(cells),), np.int32, "slots needed") as needed,
+            runtime.buffer((len(cells),), np.int32, "slots needed") as of_each,
             runtime.upload(cells, "cells", brief=True) as of_cells,
-            runtime.upload(self._streams_of, "order of the VDIs", brief=True) as streams_of,
+            runtime.upload(places, "order of the VDIs", brief=True) as streams_of,
         ):
-            runtime.fill(needed, np.int32(0))
+            runtime.fill(of_each, np.int32(0))
             written = {"pool": pool, "ends": ends, "contributes": contributes}
             band = {"cells": of_cells, "capacity": slots, **written}
-            for launch, _ in self._walks:
+            for launch, _ in walks:
                 launch.set(**band, band_rays=rays, dark=dark)
-            self._merge.set(
-                **band, rays=rays, streams_of=streams_of, needed=needed, image=image, owner=owner
-            )
+            merge.set(**band, rays=rays, streams_of=streams_of, needed=of_each)
             for first in range(0, len(cells), most):
                 items = min(most, len(cells) - first) * CELL_ITEMS
-                for launch, n in (*self._walks, (self._merge, self._merged_rays)):
+                for launch, n in (*walks, (merge, variant.rays)):
                     launch(items // n, GROUP // n, first_cell=first)
-            return runtime.download(needed)
+            found = runtime.download(of_each)
+        needed = max(needed, int(found.max()))
+        cells, slots = cells[found > slots], needed
+    return needed
 
 
 def blended(parts: Sequence[tuple[VDI, float]], request: FrameRequest) -> NDArray[np.float32]:

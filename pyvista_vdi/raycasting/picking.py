@@ -86,7 +86,7 @@ class FirstHit(Options):
         ray runs across the lists, it crosses little of each.
     """
 
-    opacity_threshold: float = option(0.05, Number("an opacity", high=np.nextafter(1.0, 0.0)))
+    opacity_threshold: float = option(0.05, Number("an opacity", high=1, below=True))
     accumulated: bool = True
 
     @property

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyvista_vdi.device import DeviceBuffer
+from pyvista_vdi.device import DeviceBuffer, Keep
 from pyvista_vdi.model import ray_forms as rays
 from pyvista_vdi.model.camera import Camera
 from pyvista_vdi.model.options import FrameRequest, RenderOptions
 from pyvista_vdi.model.ray_forms import Rectangle
 from pyvista_vdi.raycasting.picking import FirstHit
-from pyvista_vdi.raycasting.prepared import Keep, PreparedVDI
+from pyvista_vdi.raycasting.prepared import PreparedVDI
 
 #: Share of a window above which rays are cast through all of it: clearing it first costs as much.
 _MOST_DRAWN = 0.9

@@ -49,7 +49,7 @@ WRONG = [
     ("clipping_planes", "x < 0", rf"{PLANES}.*'x < 0'"),
     ("cropping", (0, 1), "cropping"),
     ("opacity_multiplier", -1, "got -1"),
-    ("opacity_threshold", 1, "opacity_threshold must be an opacity from 0"),
+    ("opacity_threshold", 1, "opacity_threshold must be an .* from 0 to below 1; got 1"),
     ("sample_distance", 0, "sample_distance must be .*got 0$"),
     ("sample_distance", "small", "sample_distance must be .*got 'small'"),
     ("criterion", "homogenity", "did you mean 'homogeneity'"),

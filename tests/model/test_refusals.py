@@ -19,7 +19,7 @@ from pyvista_vdi.errors import (
 )
 from pyvista_vdi.model.camera import MAX_WINDOW_EDGE, Camera, check_window_size
 from pyvista_vdi.model.metrics import compare_images
-from pyvista_vdi.model.options import MAX_PREVIEW_SAMPLES, RenderOptions
+from pyvista_vdi.model.options import RenderOptions
 from pyvista_vdi.model.packing import DEPTH_CODES
 
 pytestmark = pytest.mark.fast
@@ -107,8 +107,8 @@ REFUSED = {
         ({"cropping": (1, 2, 3)}, "cropping"),
         ({"opacity_multiplier": -1}, "opacity_multiplier"),
         ({"preview_samples": "8"}, "preview_samples must be .* got '8'"),
-        ({"preview_samples": MAX_PREVIEW_SAMPLES + 1}, "preview_samples must be"),
-        ({"transmittance_cutoff": 1}, "transmittance_cutoff must be a share of the light from 0"),
+        ({"preview_samples": 2**23 + 1}, "preview_samples must be"),
+        ({"transmittance_cutoff": 1}, "transmittance_cutoff must be .* from 0 to below 1; got 1"),
     ],
     TransferFunction: [
         ({"opacities": [0.5]}, "as many opacities as colors; got 1 and 2"),

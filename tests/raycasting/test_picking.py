@@ -35,7 +35,7 @@ def slabs(thin=0.02, solid=30.0, edge=8, camera=FACING):
 @pytest.mark.parametrize(
     ("pixel", "options", "message"),
     [
-        ((0, 0), {"opacity_threshold": 1}, "opacity_threshold must be an opacity from 0"),
+        ((0, 0), {"opacity_threshold": 1}, "opacity_threshold must be .* from 0 to below 1"),
         ((8, 0), {}, "pixel must be .* inside the window of 8 x 8"),
         ((1, 2, 3), {}, "pixel must be .* inside the window of 8 x 8"),
         ((0, 0), {"opaque_depth": [1.0, 2.0]}, "opaque_depth must be a view depth"),

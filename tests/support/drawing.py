@@ -7,7 +7,6 @@ from dataclasses import replace
 from pyvista_vdi.generation import generate
 from pyvista_vdi.model.chunked import ChunkedArray
 from pyvista_vdi.model.options import (
-    TRANSMITTANCE_CUTOFF,
     FrameRequest,
     GenerationOptions,
     GenerationRequest,
@@ -94,6 +93,6 @@ def raycast_volume(volume, camera, size, transfer_function, *, early_termination
     """The picture of a volume."""
     names = MediumOptions.__dataclass_fields__
     sampling = {name: options.pop(name) for name in names if name in options}
-    cutoff = TRANSMITTANCE_CUTOFF if early_termination else 0.0
+    cutoff = RenderOptions.transmittance_cutoff if early_termination else 0.0
     request = frame(None, camera, size, transmittance_cutoff=cutoff, **options)
     return render.raycast_volume(volume, transfer_function, request, MediumOptions(**sampling))

@@ -10,7 +10,7 @@ EXTENSION = Extension(
             ".exr",
             "pyvista_vdi.extensions.deep_exr.files",
             read_options=("camera", "thickness"),
-            needs='the package OpenEXR (pip install "pyvista-vdi[exr]")',
+            needs='the package OpenEXR (pip install "pyvista-vdi[exr]"); or use .vdi files',
         ),
     )
 )

@@ -12,11 +12,7 @@ from typing import Any
 import numpy as np
 
 from pyvista_vdi.device import get_runtime
-from pyvista_vdi.errors import (
-    InvalidArgumentError,
-    InvalidArgumentTypeError,
-    MissingDependencyError,
-)
+from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError, needing
 from pyvista_vdi.extensions.large.blocks import BLOCK_BYTES, Blocks, cuts_of
 from pyvista_vdi.extensions.large.passes import BlockSummary, Piece, Rows, Task
 from pyvista_vdi.generation.generate import made_from, report
@@ -54,14 +50,10 @@ def generate_in_blocks(
     task = Task.of(blocks, request, scalars)
     if client is None:
         return _generated(request, task, _Here(request))
-    try:
+    with needing("a cluster needs dask.distributed: pip install 'pyvista-vdi[dask]'"):
         from distributed import Client
 
         from pyvista_vdi.extensions.large.on_dask import Cluster
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"a cluster needs dask.distributed ({error}): pip install 'pyvista-vdi[dask]'"
-        ) from error
     if not isinstance(client, str | Client):
         raise InvalidArgumentTypeError(
             f"client must be a distributed.Client or the address of a scheduler; got "

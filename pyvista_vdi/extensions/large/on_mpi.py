@@ -23,8 +23,8 @@ from pyvista_vdi.errors import (
     DeviceMemoryError,
     InvalidArgumentError,
     InvalidArgumentTypeError,
-    MissingDependencyError,
     VDIError,
+    needing,
 )
 from pyvista_vdi.extensions.large.blocks import Blocks, Ends, Indices
 from pyvista_vdi.extensions.large.generate import ranges_of, vdi_of
@@ -60,13 +60,9 @@ def ranks_of(comm: Any) -> Any:
     needed = ("rank", "size", "allgather", "alltoall", "scatter")
     if comm is not None and all(hasattr(comm, name) for name in needed):
         return comm
-    try:
+    how = "pip install 'pyvista-vdi[mpi]', for the Python that they run"
+    with needing(f"several ranks need mpi4py: {how}"):
         from mpi4py import MPI
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"several ranks need mpi4py ({error}): pip install 'pyvista-vdi[mpi]', for the Python "
-            "that they run"
-        ) from error
     if comm is None:
         return MPI.COMM_WORLD
     with together(MPI.COMM_WORLD, "reading the arguments"):  # where the others most likely are

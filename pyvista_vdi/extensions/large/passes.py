@@ -204,7 +204,7 @@ class Task:
                     records.begin(part)
                     for chunk in march.chunks(part):
                         march.advance(chunk)
-                        records.make_room(last=chunk.last)
+                        records.make_room(last=chunk.stop >= march.most_steps)
                     if options.criterion == "least-error":
                         records.fit()
                     of_part, runs_of_part = _downloaded(records, part)

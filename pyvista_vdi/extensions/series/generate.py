@@ -59,7 +59,7 @@ def generate_series(
     progress : callable, optional
         Called after each step with the finished fraction, where the number of steps is known; work
         stops if it returns ``False``.
-    device : str, int or device, optional
+    device : str, DeviceInfo or Runtime, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     **options
         All else that :func:`pyvista_vdi.generate` takes, classification included, but for quality

@@ -44,7 +44,7 @@ class SeriesWriter(contextlib.AbstractContextManager["SeriesWriter"]):
         As for :meth:`VDI.save`.
     level : int, optional
         Effort of the compressor, 1 to 9.
-    device : str, int or device, optional
+    device : str, DeviceInfo or Runtime, optional
         Where volumes become VDIs.
     append : bool, default: False
         Continue the series, if it is there already: times must be above that of its last step,

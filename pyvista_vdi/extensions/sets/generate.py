@@ -59,7 +59,7 @@ def generate_set(
         is a cone.
     lists : float, default: 1.0
         Lists along an edge over pixels, 0.05 to 8.
-    device : str, int or device, optional
+    device : str, DeviceInfo or Runtime, optional
         Where it runs; by default ``PYVISTA_VDI_DEVICE``, else the best device found.
     progress : callable, optional
         Called with the finished fraction, 0 to 1; work stops if it returns ``False``.

@@ -18,7 +18,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from urllib.parse import quote, urlsplit
 
-from pyvista_vdi.errors import Cancelled, InvalidArgumentError, MissingDependencyError, VDIError
+from pyvista_vdi.errors import Cancelled, InvalidArgumentError, VDIError, needing
 from pyvista_vdi.extensions.web.bundle import viewer_script
 from pyvista_vdi.extensions.web.page import html_page
 from pyvista_vdi.extensions.web.source import BadMessageError, Source, Wish, wish_after
@@ -28,13 +28,9 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.types import DeviceLike, OcclusionLike, VolumeLike
 
-try:
+with needing("serving needs aiohttp: pip install 'pyvista-vdi[web]'"):
     from aiohttp import WSCloseCode, WSMsgType, web
     from aiohttp.typedefs import Handler
-except ImportError as error:
-    raise MissingDependencyError(
-        'serving needs aiohttp, which is not installed: pip install "pyvista-vdi[web]"'
-    ) from error
 
 #: Bytes of one message of a VDI: a slow line takes it long before a client counts as gone.
 CHUNK = 64 * 1024
@@ -323,7 +319,7 @@ def serve(
         As for :func:`pyvista_vdi.generate`; shorter lists by default, which are sent sooner.
     max_clients : int
         Most pages at once.
-    device : str, int or device, optional
+    device : str, DeviceInfo or Runtime, optional
         See :func:`pyvista_vdi.list_devices`; all clients share it, one piece of work each in turn.
     wait : bool
         Print the URL, and return when Ctrl-C ends the server; ``False`` returns it at once, and

@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from typing import Any
 
-from pyvista_vdi.errors import InvalidArgumentError, MissingDependencyError
+from pyvista_vdi.errors import InvalidArgumentError, needing
 from pyvista_vdi.extensions.series.series import VDISeries
 from pyvista_vdi.extensions.web import shown as of_viewers
 from pyvista_vdi.extensions.web.bundle import viewer_script
@@ -15,14 +15,9 @@ from pyvista_vdi.model.options import checked_planes
 from pyvista_vdi.model.packing import DEPTH_CODES
 from pyvista_vdi.model.vdi import picture_view
 
-try:
+with needing("a VDI in a notebook is turned by anywidget: pip install 'pyvista-vdi[notebook]'"):
     import anywidget
     import traitlets
-except ImportError as error:
-    raise MissingDependencyError(
-        "a VDI is turned in a notebook by anywidget, which is not installed: "
-        'pip install "pyvista-vdi[notebook]"'
-    ) from error
 
 #: What anywidget calls in the page: a view of the model that the kernel's widget is.
 _RENDER = """

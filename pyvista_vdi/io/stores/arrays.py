@@ -11,9 +11,9 @@ import numpy as np
 
 from pyvista_vdi.errors import (
     InvalidVolumeError,
-    MissingDependencyError,
     UnsupportedError,
     VDIError,
+    needing,
     warn_external,
 )
 from pyvista_vdi.io.stores.record import AXES, Level, Store
@@ -120,12 +120,8 @@ def names_in(path: str | os.PathLike[str]) -> list[str]:
 
 
 def _opened(path: str) -> Any:
-    try:
+    with needing(f"{path} needs h5py: pip install 'pyvista-vdi[files]'"):
         import h5py
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"{path} needs h5py ({error}): pip install 'pyvista-vdi[files]'"
-        ) from error
     try:
         return h5py.File(os.path.abspath(path), "r")  # noqa: PTH100 - links may differ elsewhere
     except (OSError, ValueError) as error:

@@ -8,12 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pyvista_vdi.errors import (
-    InvalidVolumeError,
-    MissingDependencyError,
-    UnsupportedError,
-    VDIError,
-)
+from pyvista_vdi.errors import InvalidVolumeError, UnsupportedError, VDIError, needing
 from pyvista_vdi.io.axes import one_unit
 from pyvista_vdi.io.stores.arrays import BROKEN, array_store, check_axes, grid_of, only_array
 from pyvista_vdi.io.stores.record import Level, Store
@@ -21,12 +16,8 @@ from pyvista_vdi.io.stores.record import Level, Store
 
 def open_zarr(path: str, inner: str) -> Store:
     """Open an array or a multi-scale image of a zarr store, by its name or as the only one."""
-    try:
+    with needing(f"{path} needs zarr: pip install 'pyvista-vdi[files]'"):
         import zarr
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"{path} needs zarr ({error}): pip install 'pyvista-vdi[files]'"
-        ) from error
     try:
         # Other processes, and this one in another folder, open the same one
         node: Any = zarr.open(path if "://" in path else os.path.abspath(path), mode="r")  # noqa: PTH100

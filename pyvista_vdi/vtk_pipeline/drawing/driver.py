@@ -635,7 +635,7 @@ class Driver:
             if source is None or (source.last is not None and source.prop is None):
                 return None if source is None else source.last
             return source.vdi()  # in the colours that its property has by now
-        if source.has_view:
+        if source.GetCamera() is not None and source.GetWindowSize() is not None:
             # Unless frames keep it up to date, or will
             kept = self.settings.draw == "vdi" or self.making is not None
             if source.last is None or not kept:

@@ -10,7 +10,6 @@ from typing import Any
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.checks import Number, as_flag
 from pyvista_vdi.model.options import (
-    TRANSMITTANCE_CUTOFF,
     DrawingOptions,
     Option,
     RenderOptions,
@@ -26,7 +25,7 @@ class MapperSettings:
     regenerate: Policy = "auto"
     regenerate_below: float | None = None
     opacity_multiplier: float = 1.0
-    transmittance_cutoff: float = TRANSMITTANCE_CUTOFF
+    transmittance_cutoff: float = RenderOptions.transmittance_cutoff
     target_fps: float | None = None  # the window's desired update rate; 0: no previews
     image_distance: float = 1.0
     adjust: bool = True

@@ -148,15 +148,6 @@ class Window:
             self.of_frame[key] = list(_volumes_of(renderer.GetViewProps()))
         return self.of_frame[key]  # type: ignore[no-any-return]
 
-    def shown(self) -> list[tuple[Any, ShownVolume]]:
-        """Return the VDIs of this window, each with the renderer that shows it."""
-        window, found = self.vtk_window(), []
-        for known in self._renderers.values():
-            renderer = known()
-            if renderer is not None and window.HasRenderer(renderer):
-                found += [(renderer, v) for v in self.shown_in(renderer) if v.driver is not None]
-        return found
-
     # What is seen of it
 
     def rate(self, settings: Any) -> float:
@@ -207,9 +198,14 @@ class Window:
         self.started = now()
         self.of_frame.clear()
         self.number += 1
+        # Find the VDIs of this window, each with the renderer that shows it
+        window, shown = self.vtk_window(), []
+        for known in self._renderers.values():
+            renderer = known()
+            if renderer is not None and window.HasRenderer(renderer):
+                shown += [(renderer, v) for v in self.shown_in(renderer) if v.driver is not None]
         # Between two frames only: no frame shows two generations, nor does a picture in tiles
-        window = self.vtk_window()
-        drivers = dict.fromkeys(each.driver for _, each in self.shown())
+        drivers = dict.fromkeys(each.driver for _, each in shown)
         if self.whole_picture:
             for driver in drivers:
                 driver.advance()
@@ -219,13 +215,13 @@ class Window:
         samples = window.GetMultiSamples()
         if samples and self.pace.slow_samples:
             # A frame goes without where all VDIs of the window let previews do
-            shown = [(each.driver.settings, r) for r, each in self.shown() if each.visible]
+            seen = [(each.driver.settings, r) for r, each in shown if each.visible]
             cameras = [known() for known in self._known]
-            if shown and all(
+            if seen and all(
                 self.previews(settings)
                 and not self.keeps_picture
                 and renderer.GetActiveCamera() in cameras
-                for settings, renderer in shown
+                for settings, renderer in seen
             ):
                 self._given_up, samples = samples, 0
                 window.SetMultiSamples(0)

@@ -368,11 +368,6 @@ class VDISource(SceneAlgorithm, Input):
             self.GetLights()
             self.lit_by.Set(None)
 
-    @property
-    def has_view(self) -> bool:
-        """Whether somebody, or a frame, has given a view to make the VDI of."""
-        return self.GetCamera() is not None and self.GetWindowSize() is not None
-
     def view_is_chosen(self, wanted: Request | None) -> bool:
         """Whether somebody has chosen the view: since the last VDI, or for the first one."""
         made = self.made_of
@@ -384,8 +379,8 @@ class VDISource(SceneAlgorithm, Input):
         self, camera: Any, size: tuple[int, int], model_transform: NDArray[np.float64]
     ) -> None:
         """Take a renderer's view, unless nothing can be drawn from it; this raises why not."""
-        given, view = self.GetCamera(), None
-        if not self.has_view:
+        given, given_size, view = self.GetCamera(), self.GetWindowSize(), None
+        if given is None or given_size is None:
             view = self.view_for(camera, size, model_transform)
             self.MakeRequest(view)
         if given is None and view is not None:
@@ -393,7 +388,7 @@ class VDISource(SceneAlgorithm, Input):
         elif self.of_scene and self._frame_camera is None and self.made_of is None:
             # One that was given with the volume
             self.SetCamera(given.replace(model_transform=model_transform))
-        if self.GetWindowSize() is None:
+        if given_size is None:
             self.take_size(size)
 
     def view_for(
