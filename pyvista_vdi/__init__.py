@@ -48,7 +48,6 @@ registry.core = registry.Extension(
         registry.FileFormat(
             ".vdi",
             "pyvista_vdi.io.vdi_file",
-            write_options=("precision",),
             compressions=("lz4", "zstd", "deflate", "none"),
             values=True,
         ),

@@ -26,8 +26,8 @@ class FileFormat:
     module: str  # has read, read_info and, of single VDIs, write
     holds: str = "VDI"  # or "series", "set": what is read from it
     read_options: tuple[str, ...] = ()
-    write_options: tuple[str, ...] = ()  # beside compression and level
-    compressions: tuple[str, ...] = ()  # the first by default; without any neither is an option
+    write_options: tuple[str, ...] = ()  # beside compression, level and precision
+    compressions: tuple[str, ...] = ()  # the first by default; without any none is an option
     head: str = ""  # of a folder or ZIP of VDIs its file that is last in a folder, first in a ZIP
     page: bool = False  # may hold another's file: module has begins_with and data_in
     values: bool = False  # holds VDIs that keep values as well

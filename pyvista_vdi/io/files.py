@@ -114,7 +114,7 @@ def check_write_options(path: str | os.PathLike[str], options: Mapping[str, Any]
     """Raise InvalidArgumentError now if :func:`write` would refuse an option for this file."""
     found = format_named(path) or registry.core.formats[0]
     compressions = found.compressions
-    of_compressed = ("compression", "level") if compressions else ()
+    of_compressed = ("compression", "level", "precision") if compressions else ()
     _check_names("written", path, options, (*of_compressed, *found.write_options))
     compression = options.get("compression", next(iter(compressions), None))
     if compressions:

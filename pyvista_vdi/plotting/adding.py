@@ -166,8 +166,7 @@ def added(plotter: Any, volume: Any, asked: Addition) -> Any:
 
     Of blocks a list is returned.
     """
-    if asked.target:
-        refuse_settings(asked.target, asked.options)
+    refuse_settings(asked.target, asked.options)
     if isinstance(volume, vtkMultiBlockDataSet):
         return _blocks(plotter, pv.wrap(volume), asked)
     get_runtime(asked.making.device)  # a missing device is said here, not while a frame is drawn
@@ -348,7 +347,8 @@ def _source(volume: Any, asked: Addition) -> VDISource:
     source.SetInputDataObject(data)
     source.SetScalars(name, preference)
     source.SetOptions(asked.options)
-    source.SetDial(**asked.target.given)
+    if asked.target:
+        source.SetDial(**asked.target.given)
     source.SetDevice(asked.making.device)
     progress: Any = asked.making.progress_bar
     if not callable(progress):

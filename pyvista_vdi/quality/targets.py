@@ -114,7 +114,7 @@ def warn_missed(vdi: VDI) -> None:
 def refuse_settings(target: QualityTarget, options: GenerationOptions) -> None:
     """Refuse options that are chosen for a target where they do not have their defaults."""
     fixed = [f"{name}={value!r}" for name, value in options.given.items() if name in _CHOSEN]
-    if fixed:
+    if target and fixed:
         asked = ", ".join(f"{name}={value!r}" for name, value in target.given.items())
         raise InvalidArgumentError(
             f"{asked} chooses the settings of the VDI, among them {', '.join(fixed)}: leave out "

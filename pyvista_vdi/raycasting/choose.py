@@ -156,8 +156,7 @@ def aligned_view(scene: Scene, switches: Mapping[str, int | str]) -> ChosenKerne
     # The forms of (u, v, depth, denominator), and the t between which a ray may meet something
     coordinates = scene.forms[:4]
     near, far = rays.depth_range(scene.camera, scene.prepared.bounds)
-    if not scene.camera.parallel_projection:
-        near = max(near, rays.nearest_depth(scene.camera, scene.prepared.bounds))
+    near = max(near, rays.nearest_depth(scene.camera, scene.prepared.bounds))
     ends = near - scene.reference_depth, far - scene.reference_depth
     first: list[int] = []
     # The corners, edges and middle speak for all: places depend on the pixel by a homography

@@ -459,50 +459,29 @@ class KeptValues(PreparedVDI):
         return shown
 
 
-class _MadeOnce:
-    """What is made once of a thing for a device, and kept as long as both are.
+_made: weakref.WeakKeyDictionary[Any, dict[Runtime, tuple[Any, list[PreparedVDI]]]]
+_made = weakref.WeakKeyDictionary()  # with the lock of whoever makes it
+_made_lock = threading.Lock()
+
+
+def prepared_vdi(runtime: Runtime, vdi: VDI | DeferredVDI) -> PreparedVDI:
+    """Return a VDI, or the values of a deferred one, on the device: made once, kept as it lives.
 
     Whoever comes first makes it, others wait for that one only.
     """
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._places: weakref.WeakKeyDictionary[Any, dict[Runtime, tuple[Any, list[Any]]]]
-        self._places = weakref.WeakKeyDictionary()
-
-    def of(self, runtime: Runtime, thing: Any, make: Callable[[], Any]) -> Any:
-        with self._lock:
-            places = self._places.setdefault(thing, {})
-            lock, made = places.setdefault(runtime, (threading.Lock(), []))
-        with runtime.holding(lock):
-            if not made:
-                made.append(make())
-            return made[0]
-
-    def release(self, thing: Any) -> None:
-        with self._lock:
-            gone = self._places.pop(thing, None)
-        del gone  # without the lock
-
-
-_prepared, _kept = _MadeOnce(), _MadeOnce()
-
-
-def prepared_vdi(runtime: Runtime, vdi: VDI) -> PreparedVDI:
-    """Return the VDI on the device, made once and kept as long as the VDI lives."""
-
-    def make() -> PreparedVDI:
-        if isinstance(vdi.late, ValuesLook):
-            return kept_values(runtime, vdi.late.deferred).shown(vdi.late)
-        return PreparedVDI(runtime, vdi)
-
-    return _prepared.of(runtime, vdi, make)  # type: ignore[no-any-return]
-
-
-def kept_values(runtime: Runtime, deferred: DeferredVDI) -> KeptValues:
-    """Return the lists of a deferred VDI on the device, made once and kept as long as it lives."""
-    made = partial(KeptValues, runtime, deferred)
-    return _kept.of(runtime, deferred, made)  # type: ignore[no-any-return]
+    with _made_lock:
+        places = _made.setdefault(vdi, {})
+        lock, made = places.setdefault(runtime, (threading.Lock(), []))
+    with runtime.holding(lock):
+        if not made:
+            if isinstance(vdi, DeferredVDI):
+                made.append(KeptValues(runtime, vdi))
+            elif isinstance(vdi.late, ValuesLook):
+                values: Any = prepared_vdi(runtime, vdi.late.deferred)
+                made.append(values.shown(vdi.late))
+            else:
+                made.append(PreparedVDI(runtime, vdi))
+        return made[0]
 
 
 def release_from_devices(things: Iterable[VDI | DeferredVDI | Volume | None]) -> None:
@@ -510,9 +489,9 @@ def release_from_devices(things: Iterable[VDI | DeferredVDI | Volume | None]) ->
     for thing in things:
         if isinstance(thing, Volume):
             release_voxels(thing)
-        elif isinstance(thing, DeferredVDI):
-            _kept.release(thing)
         elif thing is not None:
-            _prepared.release(thing)
-            if hasattr(thing.late, "on"):
+            with _made_lock:
+                gone = _made.pop(thing, None)
+            del gone  # without the lock
+            if isinstance(thing, VDI) and hasattr(thing.late, "on"):
                 thing.late.arrays()

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, get_runtime, padded
 from pyvista_vdi.model.options import FrameRequest
-from pyvista_vdi.model.ray_forms import pixel_rays
 from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.raycasting.choose import choose
 from pyvista_vdi.raycasting.picking import FirstHit
@@ -44,10 +43,10 @@ def render_first_hits(vdi: VDI, request: FrameRequest, hit: FirstHit) -> NDArray
     with ExitStack() as stack:
         keep = stack.enter_context
         image = keep(runtime.buffer(request.window_size[::-1], name="depth of first hits"))
-        enqueue(Scene.of(prepared, request, keep, hit), image)
+        scene = Scene.of(prepared, request, keep, hit)
+        enqueue(scene, image)
         t = runtime.download(image)
-    rays = pixel_rays(request.camera, request.window_size, vdi.bounds)
-    return (t + rays.reference_depth).astype(np.float32)
+    return (t + scene.reference_depth).astype(np.float32)
 
 
 def enqueue(scene: Scene, image: DeviceBuffer) -> None:

@@ -16,10 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from pyvista_vdi.device import DeviceBuffer, Keep, Runtime, bytes_text, kept_together
+from pyvista_vdi.device import DeviceBuffer, Keep, Runtime, kept_together
 from pyvista_vdi.device.constants import GROUP, block_items
-from pyvista_vdi.errors import DeviceMemoryError
-from pyvista_vdi.model.volume import Volume
 from pyvista_vdi.volume.rays import Variant
 
 #: Logarithms to base 2 of the cells along a brick's edge: large ones copy fewer points twice.
@@ -262,26 +260,3 @@ def in_parts(
                 for start, end in zip(first, ends, strict=True)
             ),
         )
-
-
-def too_small(
-    volume: Volume, room: Room, runtime: Runtime, whole: int, brick: int
-) -> DeviceMemoryError:
-    """Return the error for a volume of which not even one brick has room.
-
-    ``whole``, ``brick``: bytes of the volume, and of one brick, each with what it needs beside.
-    """
-    info, (nx, ny, nz) = runtime.info, volume.dimensions
-    given = (
-        f"{info.full_name!r} has {bytes_text(info.global_memory)}, of which this process holds "
-        f"{bytes_text(runtime.allocated)}, and allows {bytes_text(info.max_allocation)} per buffer"
-        if room.limit is None
-        else f"memory_limit is {bytes_text(room.limit)}"
-    )
-    return DeviceMemoryError(
-        f"the volume {volume.name!r}, {nx} x {ny} x {nz} of {volume.array.dtype} takes "
-        f"{bytes_text(whole + room.working)} in one piece and at least "
-        f"{bytes_text(brick + room.working + room.samples)} brick by brick, "
-        f"{room.rays} included; {given}: raise memory_limit, or use a smaller window size or "
-        "max_supersegments, or another device"
-    )

@@ -22,7 +22,6 @@ from pyvista_vdi.volume.bricks import (
     DeviceBricks,
     Room,
     fitting_layout,
-    too_small,
 )
 from pyvista_vdi.volume.occlusion_grid import ambient_transmittances
 from pyvista_vdi.volume.rays import GridPart, GridRays, Variant, checked_sample_distance
@@ -317,20 +316,35 @@ def _bricks_within(
     transfer_function: TransferFunction,
     visible: DeviceBuffer,
 ) -> DeviceBricks:
-    """Return room for bricks of a volume, none of which is there yet."""
+    """Return room for bricks of a volume, none of which is there yet.
+
+    DeviceMemoryError if not even one brick has room.
+    """
     gradients = (
         transfer_function.shading is not None or transfer_function.gradient_opacities is not None
     )
     dtype = volume.array.dtype if scale is None else np.dtype(np.float32)
     point_bytes = dtype.itemsize * math.prod(volume.array.shape[3:])
-    others = other_bytes(volume)
-    left = room.in_all(runtime) - room.working - room.samples - others
-    largest = runtime.info.max_allocation
-    found = fitting_layout(volume.dimensions, point_bytes, gradients, left, largest)
+    beside, info = other_bytes(volume) + room.working, runtime.info
+    left = room.in_all(runtime) - room.samples - beside
+    found = fitting_layout(volume.dimensions, point_bytes, gradients, left, info.max_allocation)
     if found is None:
         least = BrickLayout.of(volume.dimensions, SHIFTS[-1], gradients, point_bytes)
-        brick, whole = least.brick_bytes + least.table_bytes, device_bytes(volume, scale)
-        raise too_small(volume, room, runtime, whole + others, brick + others)
+        brick = least.brick_bytes + least.table_bytes + room.samples
+        nx, ny, nz = volume.dimensions
+        given = (
+            f"{info.full_name!r} has {bytes_text(info.global_memory)}, of which this process holds "
+            f"{bytes_text(runtime.allocated)}, and allows {bytes_text(info.max_allocation)} per "
+            "buffer"
+            if room.limit is None
+            else f"memory_limit is {bytes_text(room.limit)}"
+        )
+        raise DeviceMemoryError(
+            f"the volume {volume.name!r}, {nx} x {ny} x {nz} of {volume.array.dtype} takes "
+            f"{bytes_text(device_bytes(volume, scale) + beside)} in one piece and at least "
+            f"{bytes_text(brick + beside)} brick by brick, {room.rays} included; {given}: raise "
+            "memory_limit, or use a smaller window size or max_supersegments, or another device"
+        )
     read = partial(scaled, scale=scale)
     return DeviceBricks(
         runtime, volume.array, read, dtype, *found, room.limit, visible, volume.name

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyvista_vdi.device import DeviceBuffer, Runtime, padded
 from pyvista_vdi.errors import DeviceMemoryError
@@ -35,7 +34,11 @@ def ambient_transmittances(
     file, items = "volume/ambient_occlusion.cl", (*padded(grid.nodes[0], _GROUP), *grid.nodes[1:])
     nodes = {"nodes": grid.nodes, "cell": grid.cell, "margin": grid.margin, "padded": grid.padded}
     shape: dict[str, Any] = {name: (*numbers, 0) for name, numbers in nodes.items()}
-    places, shares = _taps(grid)
+    # Where each step's eight opacities begin, and the weights between them
+    offsets, (nx, ny, _) = grid.offsets.reshape(-1, 3), grid.padded
+    floor = np.floor(offsets)
+    places = (floor.astype(np.int64) @ np.array([1, nx, nx * ny])).astype(np.int32)
+    shares = (offsets - floor).astype(np.float32)
     opacities, ambient = _grids(runtime, grid)
     with (
         opacities,
@@ -86,12 +89,3 @@ def _grids(runtime: Runtime, grid: OcclusionGrid) -> tuple[DeviceBuffer, DeviceB
         return opacities, runtime.buffer(grid.nodes[::-1], name="ambient occlusion")
     except DeviceMemoryError as error:
         raise DeviceMemoryError(f"{error}; {remedy}") from error
-
-
-def _taps(grid: OcclusionGrid) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return where each step's eight opacities begin, and the weights between them."""
-    offsets = grid.offsets.reshape(-1, 3)
-    floor = np.floor(offsets)
-    nx, ny, _ = grid.padded
-    places = floor.astype(np.int64) @ np.array([1, nx, nx * ny])
-    return places.astype(np.int32), (offsets - floor).astype(np.float32)

@@ -18,7 +18,7 @@ from pyvista_vdi.model.inputs import as_vdi
 from pyvista_vdi.model.options import MediumOptions
 from pyvista_vdi.model.vdi import VDI, DeferredVDI
 from pyvista_vdi.quality.background import BackgroundThread, Job
-from pyvista_vdi.raycasting.prepared import kept_values, prepared_vdi
+from pyvista_vdi.raycasting.prepared import prepared_vdi
 from pyvista_vdi.vtk_pipeline.filters.inputs import DeferredInput, Input
 
 #: Bytes of steps that are kept, so that the next round need not read them.
@@ -152,7 +152,7 @@ class SeveralInput(Input):
     def _read(self, i: int, runtime: Runtime) -> VDI:
         """Read a VDI, and bring its lists, with colours or values, to the device."""
         vdi: Any = self.collection[i]
-        (kept_values if isinstance(vdi, DeferredVDI) else prepared_vdi)(runtime, vdi)
+        prepared_vdi(runtime, vdi)
         return vdi  # type: ignore[no-any-return]
 
 

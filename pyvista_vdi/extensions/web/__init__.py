@@ -27,7 +27,7 @@ EXTENSION = Extension(
         FileFormat(
             ".html",
             "pyvista_vdi.extensions.web.page",
-            write_options=("precision", "title", "background", *_LOOK),
+            write_options=("title", "background", *_LOOK),
             compressions=("deflate",),
             page=True,
             values=True,
