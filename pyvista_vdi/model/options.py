@@ -427,7 +427,7 @@ class DrawingOptions(Options):
         ``"view"``: the window.
     """
 
-    target_fps: float | None = option(30.0, Number("frames per second"))
+    target_fps: float | None = option(30.0, Number("a number of frames per second"))
     regenerate: Policy = "auto"
     regenerate_below: float | None = option(None, Number("an SSIM", high=1))
     draw: Draw = "auto"
