@@ -37,7 +37,9 @@ def with_room(array: NDArray[Any], n: int, most: int) -> NDArray[Any]:
     try:
         larger = aligned_empty((most, *array.shape[1:]), array.dtype)
     except MemoryError:
-        larger = aligned_empty((2 * n, *array.shape[1:]), array.dtype)
+        if most <= n:
+            raise
+        return with_room(array, n, 2 * n if most > 2 * n else n)
     larger[: len(array)] = array
     return larger
 

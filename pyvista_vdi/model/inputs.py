@@ -46,7 +46,7 @@ def as_volume(volume: Any, scalars: Any = None, preference: str = "point") -> Vo
             return kept[1]
         made = Volume.from_vtk(volume, scalars, preference)
         if kept is None:
-            weakref.finalize(volume, _kept.pop, id(volume)).atexit = False
+            weakref.finalize(volume, _kept.pop, id(volume), None).atexit = False
         _kept[id(volume)] = made_of, made
         return made
     if isinstance(volume, np.ndarray):

@@ -225,10 +225,7 @@ def packed(forms: Sequence[Floats]) -> NDArray[np.float32]:
 def largest_value(
     rays: PixelRays, camera: Camera, window_size: Sequence[int], bounds: ArrayLike, forms: Floats
 ) -> float:
-    """Return the largest magnitude of forms on rays that meet the bounds, over their depths.
-
-    Of each form's first number, too.
-    """
+    """Return the largest magnitude of forms, first numbers too, on rays that meet the bounds."""
     places = projected(camera, window_size, bounds_corners(bounds))
     places = np.array([(0, 0), window_size]) if places is None else np.clip(places, 0, window_size)
     ends = np.array([places.min(axis=0), places.max(axis=0)]) - np.divide(window_size, 2)

@@ -31,7 +31,7 @@ def filling_camera(
     box = np.array(as_bounds(bounds))
     if not np.any(box[1::2] > box[::2]):
         raise InvalidArgumentError(f"the bounds {box.tolist()} are a point: nothing fills a view")
-    centre = (box[::2] + box[1::2]) / 2
+    centre, half = (box[::2] + box[1::2]) / 2, (box[1::2] - box[::2]) / 2
     turn, lift = math.radians(azimuth), math.radians(elevation)
     to_eye = np.array(
         [math.sin(turn) * math.cos(lift), -math.cos(turn) * math.cos(lift), math.sin(lift)]
@@ -40,7 +40,7 @@ def filling_camera(
 
     # A corner at (x, y, z) from the centre in view axes is inside at distance d of the eye if
     # |x| <= t_x (d + z) and |y| <= t_y (d + z)
-    x, y, z = towards.axes @ (bounds_corners(box) - centre).T
+    x, y, z = towards.axes @ bounds_corners(np.outer(half, (-1, 1)).ravel()).T
     # Between the outermost corner and the viewport's edge is less than a tenth of a pixel at any
     # usual size, far more than rounding
     t_x, t_y = (t * (1 - 1e-4) for t in towards.half_extent(window_size))

@@ -294,7 +294,7 @@ class DeferredVDI(Lists):
                 f"its values are of version {version!r}, and this program reads version 1: "
                 "upgrade by pip install -U pyvista-vdi"
             )
-        if (lists.optical_depth > 0.5).any():
+        if not (lists.optical_depth <= 0.5).all():
             k = int(np.argmax(lists.optical_depth))
             raise InvalidVDIError(
                 f"supersegment {k} breaks the rule '0 <= spread <= 0.5': {lists.optical_depth[k]}"
