@@ -243,5 +243,5 @@ def _is_of_views(vdi: Any) -> bool:
 
 def _in_view(shown: Any, view: Camera) -> tuple[Any, Any]:
     """Return the VDI that is shown, of a set that nearest to the view, and the picture's size."""
-    seen = shown[shown.nearest(view)] if _is_of_views(shown) else as_vdi(shown)
+    seen = as_vdi(shown[shown.nearest(view)] if _is_of_views(shown) else shown)
     return seen, getattr(shown, "picture_size", seen.picture_size)

@@ -150,7 +150,7 @@ class Tradeoff:
 
     def save_plot(self, path: str | os.PathLike[str]) -> Path:
         """Write SSIM over each cost as a PNG by Matplotlib; it appears whole or not at all."""
-        with needing("plots are drawn by Matplotlib: pip install 'pyvista-vdi[plot]'"):
+        with needing('plots are drawn by Matplotlib: pip install "pyvista-vdi[plot]"'):
             from matplotlib.figure import Figure
 
         figure = Figure(figsize=(14.0, 10.0), layout="constrained")

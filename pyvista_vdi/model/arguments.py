@@ -14,7 +14,7 @@ from typing import Any
 from pyvista_vdi.errors import InvalidArgumentError, InvalidArgumentTypeError
 from pyvista_vdi.model import types
 from pyvista_vdi.model.checks import suggestion
-from pyvista_vdi.model.classification import Look
+from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import (
     DrawingOptions,
     FrameRequest,
@@ -48,7 +48,7 @@ def refuse_unknown(given: Iterable[str], function: str, known: Iterable[str]) ->
         if name in known:
             continue
         hint = suggestion(name, known)
-        if name in Look.declared:
+        if name in Classification.declared:
             hint = (
                 "this VDI's colours are fixed: give it to generate, or generate with "
                 "classification='deferred', which keeps values"

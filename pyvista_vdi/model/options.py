@@ -365,7 +365,7 @@ class RenderOptions(Options):
 
     clipping_planes: Any = option(None, checked_planes, "PlanesLike | None")
     cropping: Any = option(None, Cropping.from_any, "CroppingLike | None")
-    opacity_multiplier: float = option(1.0, Number("a factor of the extinction"))
+    opacity_multiplier: float = option(1.0, Number("a finite factor of the extinction"))
     # Each sample has a half, and float32 counts halves up to 2^24
     preview_samples: int | None = option(None, Number(low=1, high=2**23, whole=True))
     transmittance_cutoff: float = option(1e-6, Number(high=1, below=True))
@@ -381,8 +381,8 @@ class FrameRequest(Options):
     camera: the new view V_N
         Its model transform places the model frame in the world.
     window_size: width and height of the image in pixels
-        A VDI has those that it was made for, :attr:`VDI.picture_size`, by default; so have several,
-        where all have the same.
+        By default those that a VDI was made for, :attr:`VDI.picture_size`; of several, where all
+        have the same. Of a volume they must be given.
     opaque_depth: view depth at which each ray ends
         Distance from the eye along the view direction, world units, top row first; infinity where
         nothing is opaque.
@@ -427,7 +427,7 @@ class DrawingOptions(Options):
         ``"view"``: the window.
     """
 
-    target_fps: float | None = option(30.0, Number("frames per second"))
+    target_fps: float | None = option(30.0, Number("a number of frames per second"))
     regenerate: Policy = "auto"
     regenerate_below: float | None = option(None, Number("an SSIM", high=1))
     draw: Draw = "auto"

@@ -28,7 +28,7 @@ from pyvista_vdi.model.classification import Classification
 from pyvista_vdi.model.options import GenerationOptions
 from pyvista_vdi.model.types import DeviceLike, OcclusionLike, VolumeLike
 
-with needing("serving needs aiohttp: pip install 'pyvista-vdi[web]'"):
+with needing('serving needs aiohttp: pip install "pyvista-vdi[web]"'):
     from aiohttp import WSCloseCode, WSMsgType, web
     from aiohttp.typedefs import Handler
 

@@ -15,7 +15,7 @@ from pyvista_vdi.model.options import checked_planes
 from pyvista_vdi.model.packing import DEPTH_CODES
 from pyvista_vdi.model.vdi import picture_view
 
-with needing("a VDI in a notebook is turned by anywidget: pip install 'pyvista-vdi[notebook]'"):
+with needing('a VDI in a notebook is turned by anywidget: pip install "pyvista-vdi[notebook]"'):
     import anywidget
     import traitlets
 

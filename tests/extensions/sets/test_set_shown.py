@@ -105,9 +105,9 @@ def test_what_is_read_and_rendered_is_that_of_each_view(views, saved, tmp_path):
     expected = pvdi.render(baked, view)
     assert np.array_equal(pvdi.render(found.classified(**LOOK), view), expected)
     assert np.array_equal(pvdi.render(found, view, **LOOK), expected)
-    for refused in (lambda: pvdi.render(found, view), lambda: found.save(tmp_path / "a.html")):
+    for refused in (pvdi.render, pvdi.render_depth, lambda *_: found.save(tmp_path / "a.html")):
         with pytest.raises(InvalidVDIError, match="no colours yet"):
-            refused()
+            refused(found, view)
     with pytest.raises(InvalidVDIError, match="number 1 has colours"):
         pvdi.VDISet([views[0], baked[1]])
     with pytest.raises(TypeError, match="unexpected keyword argument .classification"):

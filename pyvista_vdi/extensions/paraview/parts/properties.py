@@ -61,7 +61,7 @@ def _button(name: str, label: str, text: str) -> str:
 
 def _sentence(option: str, more: str = "") -> str:
     what = _DECLARED[option].what
-    return f"{what[0].upper()}{what[1:]}{more}."
+    return f"{what[:1].upper()}{what[1:]}{more}."
 
 
 def _number(option: str, more: str = "") -> str:
