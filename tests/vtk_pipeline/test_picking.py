@@ -9,12 +9,7 @@ from plugin_scenes import add_ours, soft_ball
 
 import pyvista_vdi as pvdi
 from pyvista_vdi.errors import InvalidArgumentError
-from pyvista_vdi.vtk_pipeline.vtk import (
-    vtkPlane,
-    vtkPropPicker,
-    vtkRenderer,
-    vtkRenderWindow,
-)
+from pyvista_vdi.vtk_pipeline.vtk import vtkPlane, vtkPropPicker, vtkRenderer, vtkRenderWindow
 
 pytestmark = pytest.mark.gl
 

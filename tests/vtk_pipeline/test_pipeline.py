@@ -127,6 +127,8 @@ def test_mapper_takes_vdis_and_their_images_and_no_volumes():
     mapper.SetInputDataObject(vdi_to_image(vdi))
     assert mapper.GetVDI().equals(vdi)
     assert mapper.GetBounds() == (-1, 1, -1, 1, -1, 1)
+    with pytest.raises(TypeError, match="blend_mode"):
+        pvdi.VDIMapper(blend_mode=1)
     with pytest.raises(InvalidVDIError, match="put a VDISource between a volume and the mapper"):
         mapper.SetInputData(soft_ball())
     producer = vtkTrivialProducer()
@@ -137,8 +139,10 @@ def test_mapper_takes_vdis_and_their_images_and_no_volumes():
 
 
 def test_no_leaks_in_pure_vtk(no_leaks):
-    window = window_with(scene_of(our_actor()), scene_of(our_actor(ready_source())))
+    scenes = [scene_of(our_actor()), scene_of(our_actor(ready_source()))]
+    window = window_with(*scenes)
     picture(window)
     window.Finalize()
     del window
     gc.collect()
+    assert scenes[0].GetVolumes().GetLastProp().status.fps is None, "its window is gone"

@@ -124,3 +124,6 @@ class VDIMapper(VDIMapperMethods, vtkOpenGLGPUVolumeRayCastMapper):
     A problem while drawing is reported once as a ``VDIWarning`` and the last good image stays:
     exceptions cannot pass through VTK's renderer. Where nothing is left to draw, nothing is shown.
     """
+
+    def __init__(self) -> None:  # VTK's would set by name what is refused here
+        super().__init__()

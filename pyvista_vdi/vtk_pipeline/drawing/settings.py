@@ -9,11 +9,7 @@ from typing import Any
 
 from pyvista_vdi.errors import UnsupportedError
 from pyvista_vdi.model.checks import Number, as_flag
-from pyvista_vdi.model.options import (
-    DrawingOptions,
-    Option,
-    RenderOptions,
-)
+from pyvista_vdi.model.options import DrawingOptions, Option, RenderOptions
 from pyvista_vdi.model.types import Draw, Policy
 
 

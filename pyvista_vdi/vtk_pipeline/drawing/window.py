@@ -21,6 +21,7 @@ from pyvista_vdi.model.vdi import VDI
 from pyvista_vdi.quality.plan import RenderMode
 from pyvista_vdi.quality.rate import Pace
 from pyvista_vdi.quality.targets import describe
+from pyvista_vdi.vtk_pipeline.filters.algorithm import watch
 from pyvista_vdi.vtk_pipeline.filters.view import as_array
 from pyvista_vdi.vtk_pipeline.vtk import (
     VTK_INT,
@@ -142,9 +143,10 @@ class Window:
         if key not in self.of_frame or self.started is None:
             if known is None or known() is not renderer:
                 self._renderers[address] = weakly(renderer)
-                renderer.AddObserver("StartEvent", self._drawing)
-                renderer.AddObserver("EndEvent", self._drawing)
-                renderer.AddObserver("ActiveCameraEvent", self._camera_changed)
+                active = self.active  # no renderer keeps this: it goes with VTK's window
+                watch(renderer, self.vtk_window(), Window._camera_changed, "ActiveCameraEvent")
+                renderer.AddObserver("StartEvent", lambda caller, _: active.Set(caller))
+                renderer.AddObserver("EndEvent", lambda *_: active.Set(None))
             self.of_frame[key] = list(_volumes_of(renderer.GetViewProps()))
         return self.of_frame[key]  # type: ignore[no-any-return]
 
@@ -254,26 +256,24 @@ class Window:
         self.pace.ended(seconds, self.moving)
         self.of_frame.clear()
 
-    def _drawing(self, renderer: Any, event: str) -> None:
-        self.active.Set(renderer if event == "StartEvent" else None)
-
-    def _camera_changed(self, *_: Any) -> None:
+    @classmethod
+    def _camera_changed(cls, window: Any) -> None:
         """Replace a preview on the screen by the full frame before a screenshot reads it.
 
         ``vtkWindowToImageFilter`` puts a copy of its own in place of each renderer's camera, and
         may then take the picture that is on the screen, as ``Plotter.screenshot`` has it.
         """
-        window = self.vtk_window()
-        if not self._previewed or self.started is not None or window is None:
+        own = cls.of(window)
+        if not own._previewed or own.started is not None:
             return
         interactor = window.GetInteractor()
         if interactor is not None and not interactor.GetEnableRender():
             return  # it is being closed
-        self._picture_wanted = True
+        own._picture_wanted = True
         try:
             window.Render()
         finally:
-            self._picture_wanted = False
+            own._picture_wanted = False
 
 
 class Timer:
