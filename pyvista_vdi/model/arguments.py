@@ -76,9 +76,8 @@ def documented(
         if name in options and name not in described:
             told = options[name]
             kind = told.kind.removesuffix(" | None")
-            words = getattr(
-                getattr(types, kind, None), "__metadata__", [kind.replace(" | ", " or ")]
-            )
+            alias = getattr(types, kind, None)
+            words = getattr(alias, "__metadata__", [kind.replace(" | ", " or ")])
             kind = '{"' + '", "'.join(told.choices) + '"}' if told.choices else words[0]
             optional = ", optional" if "None" in told.kind or parameter.default is None else ""
             said = f"{told.what[:1].upper()}{told.what[1:]}. {told.more}".rstrip()

@@ -46,8 +46,7 @@ class Reopened:
     def __setstate__(self, state: dict[str, Any]) -> None:
         array = state["array"]
         if isinstance(array, tuple):
-            path, name = array
-            array = importlib.import_module("h5py").File(path, "r")[name]
+            array = importlib.import_module("h5py").File(array[0], "r")[array[1]]
         self.__dict__.update(state, array=array)
 
 
@@ -180,9 +179,8 @@ def voxel_type(dtype: Any) -> np.dtype[Any]:
     """Return the type that voxels of a type are held as: widened, where kernels do not read it."""
     kind = np.dtype(dtype).newbyteorder("=").name
     if _WIDENED.get(kind, kind) not in VOXEL_TYPES:
-        known = ", ".join(VOXEL_TYPES)
         raise InvalidVolumeError(
-            f"voxels of type {dtype} are not supported: convert to one of {known}"
+            f"voxels of type {dtype} are not supported: convert to one of {', '.join(VOXEL_TYPES)}"
         )
     return np.dtype(_WIDENED.get(kind, kind))
 

@@ -128,6 +128,10 @@ class Lists:
         arrays = None if self.packing else self.arrays
         return {**vars(self), "_arrays": arrays, "late": self.packing}
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._arrays = self._arrays and _read_only(self._arrays)  # NumPy's copies can be written
+
     def __repr__(self) -> str:
         width, height = self.window_size
         occupied = int(np.count_nonzero(self.counts))

@@ -54,8 +54,7 @@ class Grid:
     @property
     def length(self) -> float:
         """Diagonal of :attr:`bounds`, model units (``pyvista.DataSet.length``)."""
-        x0, x1, y0, y1, z0, z1 = self.bounds
-        return float(np.linalg.norm([x1 - x0, y1 - y0, z1 - z0]))
+        return float(np.linalg.norm(np.subtract(self.bounds[1::2], self.bounds[::2])))
 
     @property
     def default_unit_distance(self) -> float:
