@@ -125,6 +125,8 @@ class _Uploads:
     ranges: dict[Any, NDArray[np.float32]] = field(default_factory=dict)
     #: Whether float32 cannot hold float32 voxels' differences; None before anyone has looked.
     too_large: bool | None = None
+    #: Least and largest 16-bit scalar; None before anyone has looked.
+    ends: tuple[int, int] | None = None
 
     def kept(self, runtime: Runtime, what: str, key: Any, make: Callable[[], T]) -> T:
         """Return what was made last, or make it if that was of another ``key``."""
@@ -169,10 +171,7 @@ def fits_whole(runtime: Runtime, volume: Volume, scale: Scale | None, room: Room
 
 
 def upload_voxels(
-    runtime: Runtime,
-    volume: Volume,
-    scale: Scale | None,
-    variant: Variant,
+    runtime: Runtime, volume: Volume, scale: Scale | None, variant: Variant
 ) -> tuple[DeviceBuffer, DeviceBuffer]:
     """Return voxels and the scalar range of each macrocell, made for a device's last scaling."""
 
@@ -234,10 +233,7 @@ def _ranges_in_parts(
 
 
 def _macrocell_ranges(
-    runtime: Runtime,
-    dimensions: Sequence[int],
-    voxels: DeviceBuffer,
-    variant: Variant,
+    runtime: Runtime, dimensions: Sequence[int], voxels: DeviceBuffer, variant: Variant
 ) -> DeviceBuffer:
     """Return the scalar range of each macrocell of a grid of so many points along x, y and z."""
     macrocells = macrocells_over(dimensions)
@@ -257,9 +253,12 @@ def integer_ends(runtime: Runtime, volume: Volume, ranges: DeviceBuffer) -> tupl
         return None
     if dtype.itemsize == 1:
         return (0, 255) if dtype.kind == "u" else (-128, 127)
-    macrocells = runtime.download(ranges)
-    least, largest = int(macrocells[:, 0].min()), int(macrocells[:, 1].max())
-    return (least, largest) if largest - least < _MOST_LOOKED_UP else None
+    uploads = uploads_of(volume)
+    if uploads.ends is None:
+        macrocells = runtime.download(ranges)
+        uploads.ends = int(macrocells[:, 0].min()), int(macrocells[:, 1].max())
+    least, largest = uploads.ends
+    return uploads.ends if largest - least < _MOST_LOOKED_UP else None
 
 
 def _require_a_number(runtime: Runtime, volume: Volume) -> None:
