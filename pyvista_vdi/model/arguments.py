@@ -183,8 +183,8 @@ def takes(
         def called(*args: Any, **given: Any) -> Any:
             for alias in other.keys() & given.keys():
                 given[other[alias]] = given.pop(alias)
-            if not open_ended and not given.keys() <= named.keys():
-                refuse_unknown(given, called_by, (*named, *other))
+            if wrong := [n for n in given if n in records or not (open_ended or n in named)]:
+                refuse_unknown(wrong, called_by, (*named, *other))
             try:
                 signature.bind(*args, **given)
             except TypeError as error:

@@ -126,7 +126,7 @@ def test_a_vdi_composites(blending):
     ("function", "given", "message"),
     [
         (pvdi.generate, {"colormap": 1}, "did you mean 'cmap'"),
-        (pvdi.generate, {"opcity": 1}, "did you mean 'opacity'"),
+        (pvdi.render, {"vdi": VDI, "camera": CAMERA, "options": 1}, "argument 'options'"),
         (pvdi.generate, {"qqqq": 1}, "known are volume, camera"),
         (pvdi.generate, {"tolerance": 0.1}, r"settings=pyvista_vdi\.Settings\(tolerance=\.\.\.\)"),
         (pvdi.Settings, {"tolerence": 1}, "did you mean 'tolerance'"),
