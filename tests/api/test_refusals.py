@@ -38,11 +38,7 @@ WRONG = [
     ("max_supersegments", 4097, "1 to 4096; got 4097"),
     ("precision", "half", "precision must be .*'half'"),
     ("quality", "best", "quality must be .*'best'"),
-    (
-        "opaque_depth",
-        np.ones(SIZE),
-        r"must have shape \(height, width\) = \(9, 12\); got \(12, 9\)",
-    ),
+    ("opaque_depth", np.ones(SIZE), r"have shape \(height, width\) = \(9, 12\); got \(12, 9\)"),
     ("opaque_depth", "near", "opaque_depth must have shape.*'near'"),
     ("clipping_planes", [[0, 0, 0, 0, np.nan, 1]], PLANES),
     ("clipping_planes", [[0, 0, 0, 0, 0, 0]], PLANES),

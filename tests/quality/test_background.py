@@ -122,7 +122,8 @@ while background.running and not background.progress:
 assert background.running
 """
     done = run_python(code)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    heard = done.stderr.removeprefix("SYCL CPU RT Warning: Unknown host CPU.\n")  # an old driver's
+    assert (done.returncode, done.stdout, heard) == (0, "", "")
 
 
 def test_a_volume_that_both_threads_need_first(runtime, background, monkeypatch):
