@@ -229,7 +229,7 @@ def largest_value(
     places = projected(camera, window_size, bounds_corners(bounds))
     places = np.array([(0, 0), window_size]) if places is None else np.clip(places, 0, window_size)
     ends = np.array([places.min(axis=0), places.max(axis=0)]) - np.divide(window_size, 2)
-    pixels = np.reshape(np.meshgrid(1.0, *ends.T), (3, 4)).T
+    pixels = np.array([(1.0, a, b) for a in ends[:, 0] for b in ends[:, 1]])
     values, slopes = pixels @ forms[:, :3].T, pixels @ forms[:, 3:].T
     far = rays.depths[1] - rays.reference_depth
     return float(np.abs(np.vstack([forms[:, 0], values, values + far * slopes])).max())
