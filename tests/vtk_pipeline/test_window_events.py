@@ -121,7 +121,7 @@ def test_no_vdi_is_made_while_a_hand_moves_and_what_serves_goes_on_at_rest(
 
 @pytest.mark.parametrize("show", [auto, watched, off_screen])
 def test_changes(plotter, gate, show):
-    actor = show(plotter)
+    actor = show(plotter, target_fps=1)  # which a busy machine keeps
     before = frame(plotter)
     actor.mapper.lookup_table.cmap = "inferno"
     after = frame(plotter)
